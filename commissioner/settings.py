@@ -107,6 +107,12 @@ def load_motor(name_or_path: str) -> Nameplate:
     return nameplate
 
 
+def is_plate(name_or_path: str) -> bool:
+    """Whether what `load_motor` would read is a nameplate, and not another file. UsageError: there is no such one."""
+    path = Path(name_or_path) if Path(name_or_path).is_file() else _resolve(name_or_path, "motors")
+    return path.suffix == ".toml" and "rated_power_w" in read_toml(path)
+
+
 def load_procedure(
     path: Path | None = None, axes_deg: tuple[float, ...] | None = None, *, strict: bool = False
 ) -> ProcedurePlan:

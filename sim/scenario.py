@@ -152,7 +152,7 @@ def build(document: dict[str, Any], source: str = "scenario") -> Scenario:
     if kind not in ("standstill", "running"):
         raise ScenarioError(f"{source}: kind = {kind!r}, must be 'standstill' or 'running'")
     drive = dict(document.get("drive", {}))
-    plate, machine = _machine(document, source)
+    plate, machine = motor_of(document, source)
     plant = Plant(
         plate,
         machine,
@@ -233,7 +233,7 @@ def _number(value: Any, key: str, source: str, where: str) -> float:
     return value
 
 
-def _machine(document: dict[str, Any], source: str) -> tuple[Nameplate, Machine]:
+def motor_of(document: dict[str, Any], source: str) -> tuple[Nameplate, Machine]:
     """Nameplate and machine; `machine.id` starts from a row of the machine table."""
     table = dict(document.get("machine", {}))
     plate = dict(document.get("nameplate", {}))

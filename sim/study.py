@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,14 @@ import numpy as np
 
 from sim.physics.effects import CATALOGUE
 from sim.physics.inductance import inverse_gamma
-from sim.scenario import Scenario, ScenarioError, build, read_document, table_machine, table_rows
+from sim.scenario import Scenario, ScenarioError, build, motor_of, read_document, table_machine, table_rows
 from sim.truth import apparent_resistance_ohm, sensor_gain
 from sim.wire.faults import FaultError
 from sim.wire.in_process import Station
 
 LARGEST_KW, VOLTAGES = 75.0, (200.0, 500.0)
 MOST_EFFECTS = 3
+MACHINE = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "inductance_h")
 NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 
 
@@ -61,7 +63,7 @@ class Factory:
 
     def draw(
         self,
-        motor: str,
+        motor: str | Mapping[str, Any],
         seed: int,
         *,
         spread: float,
@@ -69,24 +71,53 @@ class Factory:
         noise_a: float | None,
         faults: Sequence[str],
     ) -> Drawn:
-        """ValueError where the motor, an effect or a fault is unknown, or the plant cannot be."""
+        """`motor`: a row of the machine table, a scenario file, or the tables `nameplate` and `machine` of a motor under its `name`.
+        ValueError where the motor, an effect or a fault is unknown, or the plant cannot be."""
         random = np.random.default_rng([seed, 5])
+        name = motor if isinstance(motor, str) else str(motor["name"])
         try:
-            document = read_document(motor) if Path(motor).is_file() else _document(motor, random, spread, noise_a)
+            if isinstance(motor, str) and Path(motor).is_file():
+                document = _moved(read_document(motor), motor, random, spread, noise_a)
+            else:
+                document = _document(motor, random, spread, noise_a)
             plate = document.get("nameplate", {})
             document["effects"] = {**document.get("effects", {}), **_effects(effects, plate, random)}
-            return Drawn(motor, build(document, motor), seed, faults)
+            return Drawn(name, build(document, name), seed, faults)
         except (ScenarioError, FaultError) as error:
             raise ValueError(str(error)) from error
 
 
-def _document(motor: str, random: np.random.Generator, spread: float, noise_a: float | None) -> dict[str, Any]:
+def _moved(
+    document: dict[str, Any], source: str, random: np.random.Generator, spread: float, noise_a: float | None
+) -> dict[str, Any]:
+    """A scenario with its machine moved and its noise replaced, all else as it says."""
+    plate, machine = motor_of(document, source)
+    numbers = {name: getattr(machine, name) for name in MACHINE}
+    rest = {name: value for name, value in document.get("machine", {}).items() if name != "id"}
+    sensors = {} if noise_a is None else {"noise_a": noise_a}
+    return document | {
+        "nameplate": asdict(plate), "machine": rest | _spread(numbers, random, spread),
+        "sensors": document.get("sensors", {}) | sensors,
+    }  # fmt: skip
+
+
+def _spread(machine: Mapping[str, float], random: np.random.Generator, spread: float) -> dict[str, float]:
+    return {name: value * float(random.uniform(1.0 - spread, 1.0 + spread)) for name, value in machine.items()}
+
+
+def _document(
+    motor: str | Mapping[str, Any], random: np.random.Generator, spread: float, noise_a: float | None
+) -> dict[str, Any]:
     saturation = float(random.uniform(0.2, 0.5))
-    plate, machine = table_machine(motor, saturation)
-    machine = {name: value * float(random.uniform(1.0 - spread, 1.0 + spread)) for name, value in machine.items()}
+    if isinstance(motor, str):
+        name, (plate, machine) = motor, table_machine(motor, saturation)
+    else:
+        name, plate, machine = str(motor["name"]), dict(motor["nameplate"]), dict(motor["machine"])
+        machine["inductance_h"] *= 1.0 + saturation  # it is the secant value at rated flux, as the table's
+    machine = _spread(machine, random, spread)
     peak_a = math.sqrt(2.0) * float(plate["rated_current_a"])
     return {
-        "name": motor,
+        "name": name,
         "nameplate": plate,
         "machine": {**machine, "saturation_at_rated_flux": saturation, "saturation_order": 7.0, "saturation_shape": "power"},
         "power_stage": {

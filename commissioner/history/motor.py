@@ -11,9 +11,11 @@ import numpy as np
 from commissioner.history.series import FALSE_ALARM, Array, Judged, judge
 from commissioner.identify.estimate.axes import REPEATABILITY, RESISTANCE_PER_K, TEMPERATURE_K
 from commissioner.identify.estimate.common_ground import CommonGround, Result, at_one_flux, at_temperature
-from commissioner.motor.circuit import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS, QUANTILE
 
 YEAR_S = 365.25 * 86400.0
+LEAST_SPAN_S = 7 * 86400.0
+"""Over less than this nothing is told for a year: of runs within minutes it would be thousands of per cent."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Trend:
-    """`level`: since the last step. `slope_per_year` relative, None for too few points; `alarm_distance` of the newest point in
+    """`level`: since the last step. `slope_per_year` relative, None for too few points or too short a time; `alarm_distance` of the newest point in
     standard errors against `alarm_threshold`, None for too few. `widening`: how much more the points scatter than they claim."""
 
     name: str
@@ -135,6 +137,8 @@ def _trend(
 ) -> Trend:
     """`scale`: by which what was judged is divided to be relative; None: it was the logarithm."""
     by, slope, alarm = scale or 1.0, judged.slope, judged.alarm
+    if points[-1].time_s - points[0].time_s < LEAST_SPAN_S:
+        slope = None
     steps = (
         Move(points[s.at].run, math.expm1(s.change) if scale is None else s.change / by, s.std / by, s.probability)
         for s in judged.steps
@@ -169,12 +173,12 @@ def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
         )
         for step in trend.steps:
             said.append(
-                f"{spoken} has moved by {100 * step.relative_change:+.2g} ± {100 * step.relative_std:.1g} % from {step.run} on "
+                f"{spoken} has moved by {100 * step.relative_change:+.2g} ± {100 * QUANTILE * step.relative_std:.1g} % from {step.run} on "
                 f"(by chance: {step.probability:.1g})"
             )
         if trend.is_sloping and trend.slope_per_year is not None and trend.slope_std is not None:
             said.append(
-                f"{spoken} drifts by {100 * trend.slope_per_year:+.2g} ± {100 * trend.slope_std:.1g} % a year (by chance: "
+                f"{spoken} drifts by {100 * trend.slope_per_year:+.2g} ± {100 * QUANTILE * trend.slope_std:.1g} % a year (by chance: "
                 f"{trend.slope_probability:.1g})"
             )
         if trend.is_alarm:

@@ -27,6 +27,10 @@ class Quantity(NamedTuple):
     std: float
 
 
+QUANTILE = 1.96
+"""Half of a 95 % interval over one standard deviation of a normal distribution."""
+
+
 @dataclass(frozen=True)
 class InverseGamma:
     """The four numbers that standstill data fix, SI, per-phase star equivalent, rotor referred to the stator."""

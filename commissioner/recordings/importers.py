@@ -10,12 +10,13 @@ What was changed or left unused stands in the table's notes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from commissioner.errors import DataRefused
+from commissioner.motor.nameplate import Nameplate
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
@@ -53,13 +54,15 @@ from commissioner.recordings.units import unit_in
 from commissioner.records import ReadingNote, RunningRecording, Signal
 
 _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]]] = {
-    ".mat": lambda path: (matlab.vectors(path), {}, ()),
+    ".mat": lambda path: (*matlab.variables(path), ()),
     ".tdms": lambda path: (*tdms.channels(path), ()),
     ".mf4": lambda path: (mdf4.channels(path), {}, ()),
     ".cfg": comtrade.channels,
     ".dat": comtrade.channels,
     ".cff": comtrade.channels,
 }
+PLATE_KEYS = frozenset((*(one.name for one in fields(Nameplate)), "sample_period_s", "switching_frequency_hz"))
+"""Numbers of a recording that stand beside its columns."""
 _EXPORT = "export the recording as CSV or Parquet"
 NOT_READ = {
     ".mdf": ("MDF 3", _EXPORT),
@@ -186,7 +189,8 @@ def _is_plain(path: Path) -> bool:
 
 
 def _of_binary(path: Path, mapping: ChannelMap) -> Table:
-    columns, metadata, notes = _BINARY[path.suffix.lower()](path)
+    columns, said_beside, notes = _BINARY[path.suffix.lower()](path)
+    metadata = {k: float(v[0]) for k, v in columns.items() if v.size == 1 and k in PLATE_KEYS} | said_beside
     single = [(name.rpartition(".")[2], str(float(v[0])), unit_in(name)) for name, v in columns.items() if v.size == 1]
     said = clock_in([*single, *((k, str(v), "") for k, v in metadata.items())])
     period = metadata.get("sample_period_s")

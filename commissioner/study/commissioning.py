@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from commissioner.diagnose.export.scenario import typical_motor
 from commissioner.errors import CommissionerError, ConfigurationError
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
@@ -59,7 +60,12 @@ def require_drawable(cases: Sequence[Case], file: Path) -> None:
 
 def _drawn(case: Case) -> Drawn:
     return simulator().draw(
-        case.motor, case.seed, spread=case.spread, effects=case.effects, noise_a=case.noise_a, faults=case.faults
+        typical_motor(case.motor, case.plate) if case.plate else case.motor,
+        case.seed,
+        spread=case.spread,
+        effects=case.effects,
+        noise_a=case.noise_a,
+        faults=case.faults,
     )
 
 

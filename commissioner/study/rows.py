@@ -93,8 +93,10 @@ class Rows:
         self._file.close()
         target = self.folder / TABLE
         ordered = [self.ended[case] for case in sorted(self.ended)]
+        names = dict.fromkeys(name for row in ordered for name in row)  # Arrow would take the first row's alone
+        columns: dict[str, list[Any]] = {name: [row.get(name) for row in ordered] for name in names}
         with whole_file(target) as temporary:
-            pq.write_table(pa.Table.from_pylist(ordered), temporary, compression="zstd")
+            pq.write_table(pa.table(columns), temporary, compression="zstd")
         return target
 
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import cast
 
 from markupsafe import Markup
 
+from commissioner.monitor.contract import Measured
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.records import peak
-from commissioner.report.run.quantities import BY_FIELD
+from commissioner.report.run.quantities import BY_FIELD, FOUR
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
-from commissioner.report.sheet.drawing import Panel
-from commissioner.report.sheet.numbers import digits
+from commissioner.report.sheet.drawing import Panel, Range, padded
+from commissioner.report.sheet.numbers import digits, half_width, with_interval
 from commissioner.study.rows import Row
 from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, relative_errors
 
+_OF_RUNNING = {"mean_speed_rad_per_s": "Speed, rad/s", "mean_torque_nm": "Torque, N m"}
+FEW = 200
 OUTCOMES = (COMMISSIONED, "rejected", "aborted", "faulted")
 
 
@@ -26,6 +30,8 @@ def page(rows: Sequence[Row], seen: Summary, title: str) -> str:
         parts += [_by_parameter(seen), _scatter(rows)]
     if any(row.get("peak_flux_fraction") for row in rows):
         parts.append(_flux(rows))
+    if any("file" in row for row in rows):
+        parts.append(_by_file(rows))
     if seen.reasons:
         reasons = [(reason, str(number)) for reason, number in seen.reasons.items()]
         parts.append(marks.table((marks.Column("Not accepted because"), marks.Column("Cases", right=True)), reasons))
@@ -37,8 +43,9 @@ def page(rows: Sequence[Row], seen: Summary, title: str) -> str:
 
 def _head(seen: Summary) -> Markup:
     ends = [(outcome, str(n), f"{100 * n / seen.cases:.1f} %") for outcome, n in list(seen.outcomes.items())[:4]]
-    worst = "not known" if seen.worst_flux_fraction is None else digits(seen.worst_flux_fraction, 3)
-    return marks.strip([*ends, ("Worst true flux", worst, "of the guard’s limit")])
+    worst = seen.worst_flux_fraction
+    flux = [] if worst is None else [("Worst true flux", digits(worst, 3), "of the guard’s limit")]
+    return marks.strip([*ends, *flux])
 
 
 def _by_parameter(seen: Summary) -> Markup:
@@ -60,6 +67,32 @@ def _error_row(errors: Errors, motors: str, *, is_first: bool = True) -> tuple[m
     name = Markup("{} {}").format(quantity.symbol, quantity.words) if is_first else quantity.symbol
     shown = (f"{digits(100 * value, 2)} %" for value in errors.quantiles)
     return name, motors, *shown, f"{100 * errors.coverage:.1f} %", str(errors.count)
+
+
+def _by_file(rows: Sequence[Row]) -> Markup:
+    """A row for each recording: how it ended, and what was found in it."""
+    found = [(row, list(_found(row))) for row in rows]
+    names = dict.fromkeys(name for _, values in found for name, _ in values)
+    columns = (marks.Column("Recording"), marks.Column("Outcome"), *(marks.Column(name, right=True) for name in names))
+    shown = [
+        (row.get("file", "–"), row["outcome"].replace("_", " "), *(dict(values).get(name, "–") for name in names))
+        for row, values in found
+    ]
+    return marks.table(columns, shown)
+
+
+def _found(row: Row) -> Iterator[tuple[marks.Text, str]]:
+    """Heads of columns and values with their intervals."""
+    for quantity in FOUR:
+        value, std = (row.get(f"{quantity.field}_{what}") for what in ("value", "std"))
+        if isinstance(value, float) and isinstance(std, float):
+            shown = with_interval(quantity.factor * value, half_width(std, quantity.factor))
+            yield Markup("{}, {}").format(quantity.symbol, quantity.unit), shown
+    for field, head in _OF_RUNNING.items():
+        if measured := cast("Measured | None", row.get(field)):
+            yield head, with_interval(measured["value"], half_width(measured["std"]))
+    if "causes" in row:
+        yield "Causes", row["causes"].replace("_", " ") or "–"
 
 
 def _by_effect(groups: Iterable[Group]) -> Markup:
@@ -92,18 +125,29 @@ def _errors_over_cases(rows: Sequence[Row]) -> Iterator[tuple[marks.Text, Markup
         cases = [float(row["case"]) for row in known]
         errors = 100.0 * relative_errors(known, name)
         reach = 1.1 * peak(errors) or 1.0
-        panel = Panel(160, 104, (0.0, max(1.0, *cases)), (-reach, reach), f"errors of {name}", left=30)
-        panel.grid(4).axis("", 3).level(0.0, "res").dots(cases, errors)
+        panel = Panel(160, 104, _span(cases), (-reach, reach), f"errors of {name}", left=30)
+        _dotted(panel.grid(4).axis("", 3).level(0.0, "res"), cases, errors)
         yield Markup("{}, %").format(BY_FIELD[name].symbol), panel.drawn()
+
+
+def _span(cases: Sequence[float]) -> Range:
+    return padded([0.0, max(1.0, *cases)], 0.03)
+
+
+def _dotted(panel: Panel, cases: Sequence[float], values: Iterable[float]) -> None:
+    """Few cases as points: a dot alone is not seen."""
+    if len(cases) > FEW:
+        panel.dots(cases, list(values))
+        return
+    for case, value in zip(cases, values, strict=True):
+        panel.point(case, value, radius=1.8)
 
 
 def _flux(rows: Sequence[Row]) -> Markup:
     known = [(float(row["case"]), fraction) for row in rows if (fraction := row.get("peak_flux_fraction"))]
     cases, fractions = [case for case, _ in known], [fraction for _, fraction in known]
-    panel = Panel(
-        660, 130, (0.0, max(1.0, *cases)), (0.0, 1.1 * max(1.0, *fractions)), "highest true flux of each case", left=30
-    )
-    panel.grid(4).axis("", 6).level(1.0).dots(cases, fractions)
+    panel = Panel(660, 130, _span(cases), (0.0, 1.1 * max(1.0, *fractions)), "highest true flux of each case", left=30)
+    _dotted(panel.grid(4).axis("", 6).level(1.0), cases, fractions)
     return marks.figure(
         "Highest true flux of each case, of the guard’s limit",
         panel.drawn(),

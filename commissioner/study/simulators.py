@@ -41,7 +41,7 @@ class Factory(Protocol):
 
     def draw(
         self,
-        motor: str,
+        motor: str | Mapping[str, Any],
         seed: int,
         *,
         spread: float,
@@ -49,7 +49,7 @@ class Factory(Protocol):
         noise_a: float | None,
         faults: Sequence[str],
     ) -> Drawn:
-        """`spread`: parameters moved by up to this share; `effects`: names, or one of "none", "any". ValueError: impossible."""
+        """`motor`: one of `motors`, a scenario file, or a scenario's tables `nameplate` and `machine` under a `name`; `spread`: parameters moved by up to this share; `effects`: names, or one of "none", "any". ValueError: impossible."""
         ...
 
 

@@ -10,7 +10,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from commissioner.errors import ConfigurationError
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.motor.nameplate import Nameplate
+from commissioner.settings import is_plate, load_motor
 
 MOST_CASES = 1_000_000
 
@@ -37,7 +39,7 @@ class Specification(BaseModel):
 
 @dataclass(frozen=True)
 class Case:
-    """One row to be: everything that decides it."""
+    """One row to be: everything that decides it. `plate`: of a motor that the simulator does not know."""
 
     number: int
     seed: int
@@ -50,6 +52,7 @@ class Case:
     faults: tuple[str, ...]
     axes_deg: tuple[float, ...]
     file: str = ""
+    plate: Nameplate | None = None
 
 
 def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Case]:
@@ -57,20 +60,28 @@ def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Ca
     if study.kind != "commission":
         return _of_files(study, path)
     names = list(motors) if study.motors == "all" else list(study.motors)
-    for name in names:
-        if name not in motors and not Path(name).is_file():
-            raise ConfigurationError(
-                file=str(path), key="motors", value=name, expected=f"a file, or one of: {', '.join(motors)}"
-            )
+    plates = {name: _plate(name, path, motors) for name in names}
     effects = (study.effects,) if isinstance(study.effects, str) else tuple(study.effects)
     seeds = np.random.default_rng(study.seed).integers(0, 2**31, study.runs)
     return [
         Case(
             number, int(seed), study.kind, names[number % len(names)], study.spread, effects, study.noise_a, study.links,
-            tuple(study.faults), tuple(study.axes_deg or ()),
+            tuple(study.faults), tuple(study.axes_deg or ()), plate=plates[names[number % len(names)]],
         )
         for number, seed in enumerate(seeds)
     ]  # fmt: skip
+
+
+def _plate(name: str, path: Path, motors: Sequence[str]) -> Nameplate | None:
+    """None for a motor of the simulator's, by name or as a scenario file."""
+    if name in motors:
+        return None
+    try:
+        return load_motor(name) if is_plate(name) else None
+    except UsageError as error:
+        raise ConfigurationError(
+            file=str(path), key="motors", value=name, expected=f"a file, a name in config/motors, or one of: {', '.join(motors)}"
+        ) from error  # fmt: skip
 
 
 def _of_files(study: Specification, path: Path) -> list[Case]:

@@ -11,10 +11,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.motor.circuit import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS, QUANTILE
 from commissioner.study.rows import Row
 
 COMMISSIONED = "commissioned"
+ANSWERED = frozenset(
+    {COMMISSIONED, "identified", "monitored", "explained", "nothing_significant", "not_distinguishable"}
+)
+"""Outcomes of a case that came to what its kind asks for."""
 QUANTILES = (0.5, 0.95, 1.0)
 MOST_REASONS = 20
 SIZES_KW = (1.0, 10.0)
@@ -47,7 +51,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Summary:
-    """`reasons`: how often each reason ended a case that was not accepted; `sizes`: by rated power; `effects`: a case with
+    """`reasons`: how often each reason ended a case without an answer; `sizes`: by rated power; `effects`: a case with
     several counts for each of them."""
 
     cases: int
@@ -62,7 +66,7 @@ class Summary:
 
 def summarise(rows: Sequence[Row]) -> Summary:
     """Over all rows; parameters over those that were commissioned."""
-    reasons = Counter(f"{row['outcome']}: {row['reason']}" for row in rows if row["outcome"] != COMMISSIONED)
+    reasons = Counter(f"{row['outcome']}: {row['reason']}" for row in rows if row["outcome"] not in ANSWERED)
     flux = [fraction for row in rows if (fraction := row.get("peak_flux_fraction")) is not None]
     whole = _group("all", rows)
     return Summary(
@@ -119,5 +123,5 @@ def _errors(name: str, known: Sequence[Row]) -> Errors | None:
         return None
     relative = np.abs(relative_errors(known, name))
     true, std = (np.array([row.get(f"{name}_{what}") for row in known], dtype=float) for what in ("true", "std"))
-    inside = relative * true <= 1.96 * std
+    inside = relative * true <= QUANTILE * std
     return Errors(name, len(known), tuple(float(np.quantile(relative, q)) for q in QUANTILES), float(np.mean(inside)))

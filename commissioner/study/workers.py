@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
+from itertools import islice
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -30,22 +32,26 @@ def carried_out(case: Case) -> Row:
     try:
         return commissioned(case) if case.kind == "commission" else looked_at(case)
     except CommissionerError as error:
-        return {
-            "case": case.number,
-            "seed": case.seed,
-            "motor": case.motor,
-            "outcome": error.outcome,
-            "reason": error.what,
-        }
+        return _ended(case, error.outcome, error.what)
     except Exception as defect:
-        reason = f"{type(defect).__name__}: {defect}"
-        return {"case": case.number, "seed": case.seed, "motor": case.motor, "outcome": DEFECT, "reason": reason}
+        return _ended(case, DEFECT, f"{type(defect).__name__}: {defect}")
+
+
+def _ended(case: Case, outcome: str, reason: str) -> Row:
+    """The row of a case of which nothing else is known."""
+    row: Row = {"case": case.number, "outcome": outcome, "reason": reason}
+    if case.file:
+        return row | {"file": Path(case.file).name}
+    return row | {"seed": case.seed, "motor": case.motor}
+
+
+def _died(case: Case) -> Row:
+    return _ended(case, DEFECT, f"the worker died {MOST_BREAKS} times at it")
 
 
 def here(cases: Sequence[Case], workers: int) -> Iterator[Row]:
     """Rows as they end, from `workers` processes of one thread each."""
     left = {case.number: case for case in cases}
-    breaks: dict[int, int] = {}
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
@@ -54,21 +60,26 @@ def here(cases: Sequence[Case], workers: int) -> Iterator[Row]:
                 for row in _pool(list(left.values()), workers):
                     del left[row["case"]]
                     yield row
-            except BrokenProcessPool:
-                first = next(iter(left.values()))
-                breaks[first.number] = breaks.get(first.number, 0) + 1
-                if breaks[first.number] >= MOST_BREAKS:
-                    del left[first.number]
-                    yield {
-                        "case": first.number, "seed": first.seed, "motor": first.motor, "outcome": DEFECT,
-                        "reason": f"the worker died {MOST_BREAKS} times at it",
-                    }  # fmt: skip
+            except BrokenProcessPool:  # at one of those that were handed out: each alone says which
+                for case in list(left.values())[: AHEAD * workers]:
+                    yield _alone(left.pop(case.number))
     finally:
         for name, value in before.items():
             if value is None:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def _alone(case: Case) -> Row:
+    """In a worker that has no other case, so that its death is this one's."""
+    for _ in range(MOST_BREAKS):
+        try:
+            (row,) = _pool([case], 1)
+        except BrokenProcessPool:
+            continue
+        return row
+    return _died(case)
 
 
 def _pool(cases: Sequence[Case], workers: int) -> Iterator[Row]:
@@ -121,16 +132,43 @@ def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:
             limit="a running Dask scheduler of the same version", remedy="start one, or leave --scheduler out",
         ) from error  # fmt: skip
     with client:
-        most = AHEAD * max(1, len(client.scheduler_info()["workers"]))
-        rest = iter(cases)
+        yield from _handed_out(cases, client, distributed)
 
-        def submit(count: int) -> list[Any]:
-            return [
-                client.submit(carried_out, case, pure=False, retries=MOST_BREAKS)
-                for _, case in zip(range(count), rest, strict=False)
-            ]
 
-        queue = distributed.as_completed(submit(most))
-        for future in queue:
-            yield future.result()
-            queue.update(submit(1))
+def _handed_out(cases: Sequence[Case], client: Any, distributed: Any) -> Iterator[Row]:
+    """A case whose worker died is tried again when no other runs: the scheduler blames what stood beside it, too."""
+    rest, waiting, suspects = iter(cases), dict[str, Case](), list[Case]()
+    queue = distributed.as_completed(loop=client.loop)
+
+    def hand_out() -> None:
+        """Workers may come later: they are counted anew."""
+        most = AHEAD * max(1, sum(client.nthreads().values()))
+        for case in islice(rest, max(0, most - len(waiting))):
+            future = client.submit(carried_out, case, pure=False)
+            waiting[future.key] = case
+            queue.add(future)
+
+    hand_out()
+    for future in queue:
+        case = waiting.pop(future.key)
+        try:
+            row = future.result()
+        except distributed.KilledWorker:
+            suspects.append(case)
+        except Exception as error:
+            raise _broken_cluster(case, future.status, error) from error
+        else:
+            yield row
+        hand_out()
+    for case in suspects:
+        yield from [_died(case)] if len(cases) == 1 else _handed_out([case], client, distributed)
+
+
+def _broken_cluster(case: Case, status: str, error: Exception) -> UsageError:
+    is_gone = status == "cancelled"
+    return UsageError(
+        "the scheduler is gone" if is_gone else f"the cluster cannot carry out case {case.number}",
+        step="study", value=f"{type(error).__name__}: {error}",
+        limit="a scheduler that answers" if is_gone else "workers that have this version of the program",
+        remedy=f"{'start it again' if is_gone else 'install it there'}, then give --resume",
+    )  # fmt: skip

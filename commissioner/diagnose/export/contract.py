@@ -74,6 +74,14 @@ class Scenario(TypedDict):
     effects: Mapping[str, Entry]
 
 
+class Described(TypedDict):
+    """What a scenario says of a motor alone."""
+
+    name: str
+    nameplate: Plate
+    machine: dict[str, float]
+
+
 class ModelDocument(TypedDict):
     """Of a motor at standstill. `terms` and `dictionary` are exact, `effects` the same in engineering sizes, `scenario` the nearest
     machine of the simulated inverter; no effects: the plain motor."""

@@ -11,10 +11,10 @@ from math import sqrt
 from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE, Setting
-from commissioner.diagnose.export.contract import Entry, Scenario
+from commissioner.diagnose.export.contract import Described, Entry, Scenario
 from commissioner.diagnose.plant.model import Model
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS
-from commissioner.motor.nameplate import Plate
+from commissioner.motor.nameplate import Nameplate, Plate, prior
 
 FULL_SCALE = 3.0
 """Sensor range of the scenario over the rated peak current; half again what the diagnosis calls full scale."""
@@ -36,9 +36,17 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> Scenario:
 
 def plain_scenario(nominal: Iterable[float], plate: Mapping[str, Any]) -> Scenario:
     """Of a motor by its four numbers alone, behind an ideal drive."""
-    kept = {k: plate[k] for k in NAMEPLATE_KEYS if k in plate}
     peak_a = sqrt(2.0) * float(plate["rated_current_a"])
-    return _document(kept, {**gamma_machine(nominal), "saturation_at_rated_flux": 0.0}, peak_a, {})
+    return _document(_kept(plate), {**gamma_machine(nominal), "saturation_at_rated_flux": 0.0}, peak_a, {})
+
+
+def typical_motor(name: str, plate: Nameplate) -> Described:
+    """What a scenario says of a motor of which only the plate is known: the machine is what its plate makes most likely."""
+    return {"name": name, "nameplate": _kept(plate.known()), "machine": gamma_machine(prior(plate).typical.as_tuple())}
+
+
+def _kept(plate: Mapping[str, Any]) -> Plate:
+    return {k: plate[k] for k in NAMEPLATE_KEYS if k in plate}
 
 
 def _document(plate: Plate, machine: dict[str, float], rated_peak_a: float, effects: Mapping[str, Entry]) -> Scenario:

@@ -18,13 +18,15 @@ SAME_FLUX = 0.002
 
 @dataclass(frozen=True)
 class Result:
-    """A run's result. `curve`: peak stator flux in Wb, secant L_M in H, its standard error; empty: no saturation was seen."""
+    """A run's result. `curve`: peak stator flux in Wb, secant L_M in H, its standard error; empty: no saturation was seen. `ended`: how
+    its run ended where that did not accept it."""
 
     name: str
     combined: Combined
     flux_wb: float | None
     curve: tuple[tuple[float, float, float], ...]
     winding_degc: float | None
+    ended: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,15 @@ def on_common_ground(results: Sequence[Result]) -> tuple[tuple[Combined, ...], C
 
 def at_one_flux(results: Sequence[Result]) -> tuple[Sequence[Result], float | None, list[str]]:
     known = [result.flux_wb for result in results if result.flux_wb is not None]
+    refused = [f"{one.name} was {one.ended}: its values are measured, not accepted" for one in results if one.ended]
     if len(known) < len(results):
-        return results, None, ["the flux of one result is not known: L_M is compared as it was measured"]
+        return results, None, [*refused, "the flux of one result is not known: L_M is compared as it was measured"]
     flux_wb = min(known)
     moved = [_at_flux(result, flux_wb) for result in results]
     sentences = [sentence for _, sentence in moved if sentence]
     if not sentences:
         sentences = [f"{'both' if len(results) == 2 else 'all'} L_M hold at {flux_wb:.3g} Wb peak stator flux"]
-    return [result for result, _ in moved], flux_wb, sentences
+    return [result for result, _ in moved], flux_wb, [*refused, *sentences]
 
 
 def _at_flux(result: Result, flux_wb: float) -> tuple[Result, str]:

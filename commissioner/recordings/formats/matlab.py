@@ -2,7 +2,7 @@
 
 Our own, because `scipy.io.loadmat` 1.x ends the process by a segmentation fault on a file with one bit turned round in a
 dimension or a tag, which a file from a stranger may well have. Format: MathWorks, "MAT-File Format", level 5.
-Read are real numeric arrays and scalar structures of them; text, cells, sparse and complex arrays are passed over.
+Read are real numeric arrays, text of one line, and scalar structures of them; cells, sparse and complex arrays are passed over.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from commissioner.records import Signal
 MAX_DEPTH, MAX_FIELDS, MAX_MATRIX_COLUMNS = 8, 512, 64
 _HEADER, _HDF5 = 128, b"\x89HDF"
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
-_STRUCTURE, _NUMERIC, _COMPLEX = 2, range(6, 16), 0x08
+_STRUCTURE, _TEXT, _NUMERIC, _COMPLEX = 2, 4, range(6, 16), 0x08
+_CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8"}
+LONGEST_TEXT = 1000
 _TYPES = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
@@ -61,12 +63,18 @@ class _Bytes(Stretch):
 
 def vectors(path: Path) -> dict[str, Signal]:
     """Every real numeric vector, matrix column and scalar, by its dotted path. DataRefused: damaged, or too large."""
+    return variables(path)[0]
+
+
+def variables(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
+    """(`vectors`, texts of one line), by their dotted paths. DataRefused: damaged, or too large."""
     raw = bounded_bytes(path)
     order = {b"IM": "<", b"MI": ">"}.get(raw[_HEADER - 2 : _HEADER], "")
     file = _Bytes(memoryview(raw)[_HEADER:], order, path)
     if not order or raw[:10] == b"MATLAB 7.3" or _HDF5 in raw[512:520]:
         file.refuse("another format, such as v7.3 (HDF5) or v4")
     found: dict[str, Signal] = {}
+    texts: dict[str, float | str] = {}
     limit, unpacked, numbers = unpacked_limit(path), 0, 0
     while not file.is_at_end:
         kind, content = file.element()
@@ -75,11 +83,14 @@ def vectors(path: Path) -> dict[str, Signal]:
             unpacked += len(content.data)
             kind, content = content.element()
         for name, signal in _array(content, "", MAX_DEPTH) if kind == _MATRIX else ():
+            if isinstance(signal, str):
+                texts[name] = signal
+                continue
             found[name] = signal
             numbers += NUMBER_BYTES * signal.size
             if numbers > limit:
                 raise too_large(path, f"> {limit}", limit)
-    return found
+    return found, texts
 
 
 def _unpacked(packed: _Bytes, left: int, limit: int) -> _Bytes:
@@ -93,7 +104,7 @@ def _unpacked(packed: _Bytes, left: int, limit: int) -> _Bytes:
     return _Bytes(memoryview(data), packed.order, packed.path)
 
 
-def _array(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal]]:
+def _array(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal | str]]:
     """The vectors of one array element: itself, or its fields'."""
     if body.is_at_end:  # an empty field
         return
@@ -108,9 +119,14 @@ def _array(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal]
         yield from _fields(body, full, depth)
     elif kind in _NUMERIC and not is_complex:
         yield from _columns(full, body.numbers(), shape, body)
+    elif kind == _TEXT and shape[0] == 1 and len(shape) == 2:
+        code, content = body.element()
+        if code in _CODES and len(content.data) <= LONGEST_TEXT:
+            little = "-le" if body.order == "<" else "-be"
+            yield full, bytes(content.data).decode(_CODES[code] + (little if code == 4 else ""), "replace")
 
 
-def _fields(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal]]:
+def _fields(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal | str]]:
     widths = body.numbers(_INT32)
     width = int(widths[0]) if len(widths) == 1 else 0
     text = body.text()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.report.sheet.numbers import QUANTILE
+from commissioner.motor.circuit import QUANTILE
 
 PLUS_MINUS = "± holds the true value in 19 of 20 cases."
 PLAIN_NUMBERS = frozenset({"exponent", "samples", "without_gap_in_time"})

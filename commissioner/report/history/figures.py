@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from commissioner.history.motor import Trend, Trends
+from commissioner.motor.circuit import QUANTILE
 from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, RED
-from commissioner.report.sheet.numbers import QUANTILE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

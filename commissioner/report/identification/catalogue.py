@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from commissioner.motor.circuit import QUANTILE
 from commissioner.report.page import Page, Section, Table
-from commissioner.report.sheet.numbers import QUANTILE, digits
+from commissioner.report.sheet.numbers import digits
 
 NAMES = (
     ("stator_resistance_ohm", "stator resistance R_s, warm", 1.0, "Ω"), ("rotor_resistance_ohm", "rotor resistance R_R at rated slip", 1.0, "Ω"),

@@ -95,7 +95,7 @@ def checks_and_course(subject: Subject) -> Markup:
     checks = subject.result.get("checks") or ()
     if checks:
         columns = (Column("Check"), Column("Seen", right=True), Column("Wanted", right=True), Column("Result"))
-        parts.append(marks.table(columns, (_check(row) for row in checks), "keep dense"))
+        parts.append(marks.table(columns, (_check(row) for row in checks), "keep dense checks"))
     events = [line for line in subject.journal if line["kind"] in _TOLD]
     if events:
         shown = events[:_MOST_EVENTS]
@@ -204,6 +204,8 @@ def _circuit(subject: Subject) -> Markup:
                 "always an assumption. The intervals do not hold it.", kind="small",
             )
         )  # fmt: skip
+    if not parts:
+        return marks.section("Conventions", marks.facts(_CONVENTIONS), level=3)
     parts += [Markup("<h3>Conventions</h3>"), marks.facts(_CONVENTIONS)]
     return marks.section("T circuit, for simulators that want one", *parts, level=3)
 

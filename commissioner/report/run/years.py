@@ -45,7 +45,7 @@ def _shown(years: Trends) -> list[tuple[Trend, Quantity]]:
 
 def _row(trend: Trend, quantity: Quantity) -> tuple[Markup | str, ...]:
     newest, factor, unit = trend.points[-1], quantity.factor, quantity.unit
-    slope = "too few runs" if trend.slope_per_year is None or trend.slope_std is None else (
+    slope = "too few runs, or too short a time" if trend.slope_per_year is None or trend.slope_std is None else (
         f"{signed(100 * trend.slope_per_year, 2)} ± {digits(100 * half_width(trend.slope_std), 2)} %"
     )  # fmt: skip
     return (

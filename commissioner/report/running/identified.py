@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from commissioner.estimation.fit import problem_of, simulate
+from commissioner.motor.circuit import QUANTILE
 from commissioner.records import RPM
 from commissioner.report.page import BLUE, MUTED, Page, Section, Table, figure_of, picture
 from commissioner.report.running.figures import SHOWN_S
 from commissioner.report.running.page import NAMES
 from commissioner.report.running.words import Document, number
-from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.identification import Identified
 
 if TYPE_CHECKING:

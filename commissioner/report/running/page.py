@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from commissioner.motor.circuit import QUANTILE
 from commissioner.report.page import MACHINE, Page, Section, Table, Tone, picture
 from commissioner.report.running import figures
 from commissioner.report.running.words import (
@@ -18,7 +19,6 @@ from commissioner.report.running.words import (
     spoken,
     tone,
 )
-from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from commissioner.motor.circuit import QUANTILE
 from commissioner.report.page import Tone
-from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.causes import CATALOGUE
 
 Document = Mapping[str, Any]

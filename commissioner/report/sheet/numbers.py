@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-QUANTILE = 1.96
-"""Half of a 95 % interval over one standard deviation of a normal distribution."""
+from commissioner.motor.circuit import QUANTILE
 
 
 def half_width(std: float | None, factor: float = 1.0) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.estimate.axes import Combined
 from commissioner.identify.estimate.common_ground import Result
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
+from commissioner.procedure.states import State
 from commissioner.run.archive.summary import RunSummary
 
 
@@ -28,7 +30,8 @@ def result_of(run: RunSummary) -> Result:
             f"{run.run} identified nothing", step="compare", value=run.outcome, limit="a run with parameters",
             remedy="compare runs of which `commissioner runs show RUN` shows the four parameters",
         )  # fmt: skip
-    return result_from(run.result or {}, run.run)
+    result = result_from(run.result or {}, run.run)
+    return result if run.outcome == State.COMMISSIONED.value else replace(result, ended=run.outcome)
 
 
 def result_from(document: Mapping[str, Any], name: str) -> Result:

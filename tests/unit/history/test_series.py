@@ -1,9 +1,15 @@
 """A trend names what has changed, and what has not at most as often as it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from commissioner.history.motor import Measured, motor_trends
 from commissioner.history.series import judge
+from commissioner.identify.estimate.axes import Combined
+from commissioner.identify.estimate.common_ground import Result
+from commissioner.motor.circuit import InverseGamma
 
 STATED = 0.03
 """A rate that 2 000 series can measure; trends promise 0.001 by the same formulas."""
@@ -84,3 +90,31 @@ def test_points_that_scatter_more_than_they_claim_widen_every_interval():
 def test_one_or_two_points_have_a_level_and_no_verdict(count):
     seen = judge(np.arange(float(count)), np.ones(count), np.ones(count))
     assert seen.level == 1.0 and seen.alarm is None and seen.slope is None and not seen.steps
+
+
+def test_runs_within_minutes_have_no_drift_a_year_and_an_unaccepted_one_is_said():
+    """Four runs of an hour told `-19000 +- 80000 % a year`; a rejected one stood among them as any other."""
+    result = Result("first", combined_of(), 0.7, (), 24.0)
+    runs = [Measured(f"r{k}", 60.0 * k, replace(result, name=f"r{k}")) for k in range(4)]
+    runs.append(Measured("bad", 300.0, replace(result, name="bad", ended="rejected")))
+    found = motor_trends(runs)
+    assert all(trend.slope_per_year is None for trend in found.trends)
+    assert "bad was rejected: its values are measured, not accepted" in found.common.sentences
+    later = [replace(one, time_s=one.time_s * 1e6) for one in runs]
+    assert all(trend.slope_per_year is not None for trend in motor_trends(later).trends)
+
+
+def test_a_sentence_has_the_interval_that_every_page_has():
+    """Half of it, one standard error, stood on the report's page beside intervals of 95 %."""
+    result = Result("r", combined_of(), 0.7, (), 24.0)
+    moved = replace(result.combined, parameters=InverseGamma(4.44, 2.2, 0.0215, 0.31))
+    runs = [Measured(f"r{k}", 1e7 * k, result if k < 6 else replace(result, combined=moved)) for k in range(12)]
+    trend = motor_trends(runs).trends[0]
+    (step,) = trend.steps
+    said = next(text for text in motor_trends(runs).sentences if "has moved" in text)
+    assert f"± {196.0 * step.relative_std:.1g} %" in said
+
+
+def combined_of():
+    values = np.array([3.7, 2.2, 0.0215, 0.31])
+    return Combined(InverseGamma(*values), np.diag((0.001 * values) ** 2), (0.0,) * 4, (), ())

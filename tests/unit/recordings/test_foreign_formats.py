@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.recordings.formats import mdf4, tdms
 from commissioner.recordings.importers import contract_table, import_table, read_running
+from commissioner.recordings.table import write_table
 
 DATA = Path(__file__).parents[2] / "data" / "foreign_formats"
 TIME = np.arange(400) * 1.25e-4
@@ -243,3 +244,21 @@ def test_a_comtrade_that_ends_early_says_where_and_what_it_promised(tmp_path, li
         refused.value.value
         == f"configuration: cut short after line {lines}, where the second promises 3, 3A, 0D channels"
     )
+
+
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet", ".mat"])
+def test_a_recording_of_ours_keeps_its_plate_through_every_form(tmp_path, ending):
+    """Through MATLAB it came back without any: `--motor` was asked for, and a delta was none any more."""
+    time = 2e-4 * np.arange(50)
+    columns = {"time_s": time, "segment": 0 * time, "axis_deg": 0 * time}
+    columns |= {name: np.round(np.sin(900 * time), 4) for name in ("voltage_axis_v", "current_u_a", "current_v_a")}
+    plate = {
+        "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0,
+        "rated_speed_rpm": 1436.0, "power_factor": 0.8, "pole_pairs": 2.0, "connection": "delta", "sample_period_s": 2e-4,
+    }  # fmt: skip
+    path = tmp_path / f"a{ending}"
+    write_table(path, columns, plate)
+    table = contract_table(path)
+    assert plate.items() <= table.metadata.items()
+    for name, signal in columns.items():
+        assert np.array_equal(table.columns[name], signal)

@@ -2,7 +2,9 @@
 
 import json
 import math
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from commissioner.run.job import bounds, make_job, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load, load_procedure
+from commissioner.study import commissioning, workers
 from commissioner.study.campaign import Studied, StudyRequest, carry_out
 from commissioner.study.commissioning import NoArchive
 from commissioner.study.rows import DEFECT, ENDED, TABLE, Rows
@@ -280,3 +283,83 @@ def test_a_folder_that_does_not_say_its_study_any_more_is_refused(tmp_path, spoi
 def test_what_is_no_address_of_a_scheduler_is_told_before_anyone_is_called(address):
     with pytest.raises(UsageError, match="no scheduler's address"):
         next(on_cluster([], address))
+
+
+def test_the_table_has_the_columns_of_all_rows_whatever_the_first_one_knows(tmp_path):
+    """A refused first file left the table without any parameter."""
+    rows = Rows(tmp_path, {"seed": 1}, resume=False)
+    rows.add({"case": 0, "file": "a.csv", "outcome": "rejected", "reason": "no rows"})
+    rows.add({"case": 1, "file": "b.csv", "outcome": "identified", "reason": "", "stator_resistance_ohm_value": 3.7})
+    table = pq.read_table(rows.close())
+    assert table["stator_resistance_ohm_value"].to_pylist() == [None, 3.7]
+
+
+def test_a_page_of_recordings_has_their_values_and_no_reason_for_a_good_one():
+    values = {"stator_resistance_ohm_value": 3.7, "stator_resistance_ohm_std": 0.01}
+    rows = [
+        {"case": 0, "file": "a.csv", "outcome": "rejected", "reason": "no rows"},
+        {"case": 1, "file": "b.csv", "outcome": "identified", "reason": ""} | values,
+        {
+            "case": 2,
+            "file": "c.csv",
+            "outcome": "monitored",
+            "reason": "",
+            "mean_torque_nm": {"value": 12.0, "std": 1.0},
+        },
+        {"case": 3, "file": "d.csv", "outcome": "explained", "reason": "all of it", "causes": "dead_time"},
+    ]
+    seen = summarise(rows)
+    assert seen.reasons == {"rejected: no rows": 1}
+    text = page(rows, seen, "Study")
+    for shown in ("3.700 ± 0.020", "12.0 ± 2.0", "dead time", "b.csv"):
+        assert shown in text
+    assert "guard" not in text
+
+
+def dies_at_three(cases, _workers):
+    """In place of a pool: case 0 takes longest, the worker at case 3 dies."""
+    for case in sorted(cases, key=lambda one: one.number == 0):
+        if case.number == 3:
+            raise BrokenProcessPool
+        yield {"case": case.number, "outcome": "rejected", "reason": ""}
+
+
+def test_the_case_at_which_a_worker_dies_is_named_and_no_other(monkeypatch, tmp_path):
+    """The eldest that had not ended was blamed: whichever took long."""
+    for number in range(5):
+        (tmp_path / f"{number}.csv").write_text("x", "utf-8")
+    path = study_file(tmp_path, 'kind = "identify"\nfiles = "*.csv"\n')
+    monkeypatch.setattr(workers, "_pool", dies_at_three)
+    rows = {told["case"]: told for told in here(cases_of(load(path, Specification), path, ()), 2)}
+    assert sorted(rows) == [0, 1, 2, 3, 4]
+    assert [case for case, told in rows.items() if told["outcome"] == DEFECT] == [3]
+    assert rows[3]["file"] == "3.csv"
+
+
+def test_a_cluster_carries_out_every_case(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    for number in range(9):
+        (tmp_path / f"{number}.csv").write_text("", "utf-8")
+    path = study_file(tmp_path, 'kind = "identify"\nfiles = "*.csv"\n')
+    cases = cases_of(load(path, Specification), path, ())
+    with distributed.LocalCluster(
+        1, processes=False, threads_per_worker=1, dashboard_address=None, protocol="tcp"
+    ) as cluster:
+        rows = list(on_cluster(cases, cluster.scheduler_address))
+    assert sorted(told["case"] for told in rows) == list(range(9))
+    assert {told["outcome"] for told in rows} == {"rejected"}
+
+
+def test_a_motor_file_is_a_motor_by_its_plate_and_a_scenario_file_is_moved(tmp_path):
+    motor = 'kind = "commission"\nmotors = ["{}"]\nspread = 0.1\nnoise_a = 0.05\n'
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text('[machine]\nid = "haumer_132m04"\n', "utf-8")
+    for name, rated_w in (("motor_2kw2", 2200.0), ("config/motors/motor_2kw2.toml", 2200.0), (str(scenario), 7500.0)):
+        path = study_file(tmp_path, motor.format(name))
+        (case,) = cases_of(load(path, Specification), path, simulator().motors())
+        drawn, other = commissioning._drawn(case), commissioning._drawn(replace(case, seed=case.seed + 1))
+        assert (drawn.motor, drawn.plate["rated_power_w"]) == (name, rated_w)
+        assert drawn.plate == other.plate
+        assert drawn.document["sensors"]["noise_a"] == 0.05
+        truth, moved = (one.parameters_at(0.5)["leakage_inductance_h"] for one in (drawn, other))
+        assert 0.0 < abs(moved / truth - 1.0) < 0.25

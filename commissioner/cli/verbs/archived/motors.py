@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 
 from commissioner.cli.screens import screen
 from commissioner.errors import UsageError
+from commissioner.motor.circuit import QUANTILE
 from commissioner.operations.history.motors import Likeness, Motor, judge_motor, list_motors, name_motor
 from commissioner.operations.history.runs import Archive
 from commissioner.operations.history.trend import MotorTrend, trend, trend_of_indicators
@@ -99,12 +100,14 @@ def _name(archive: Archive, run: str, tag: str, serial: str, *, confirm: bool, a
 def _show(done: MotorTrend) -> None:
     screen.out.print(f"[bold]{screen.text(done.motor)}[/]")
     rows = [
-        (one.name, str(len(one.points)), screen.quantity(one.level, one.level_std, one.unit),
-         "" if one.slope_per_year is None else f"{100 * one.slope_per_year:+.2g} ± {100 * (one.slope_std or 0.0):.1g} %",
+        (one.name, str(len(one.points)), screen.quantity(one.level, QUANTILE * one.level_std, one.unit),
+         "" if one.slope_per_year is None else f"{100 * one.slope_per_year:+.2g} ± {100 * QUANTILE * (one.slope_std or 0.0):.1g} %",
          str(len(one.steps)), "[red]alarm[/]" if one.is_alarm else "")
         for one in done.found.trends
     ]  # fmt: skip
-    screen.out.print(screen.table("", ("", "points", "level now", "a year", "steps", ""), rows, right=(1, 2, 3, 4)))
+    screen.out.print(
+        screen.table("", ("", "points", "level now, ± 95 %", "a year", "steps", ""), rows, right=(1, 2, 3, 4))
+    )
     for sentence in (*done.found.sentences, *done.found.common.sentences):
         screen.out.print(f"  [dim]•[/] {screen.text(sentence)}")
     for sentence in done.left_out:
