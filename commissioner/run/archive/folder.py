@@ -43,8 +43,8 @@ class RunFolder:
     def __init__(self, path: Path, key: bytes | None = None) -> None:
         self.path, self.key = path, key
         for name in ("journal.jsonl", "blocks.bin"):
-            if (path / name).is_symlink():
-                raise damaged(path, name, "a symbolic link")
+            if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
+                raise damaged(path, name, "a link, a pipe or a folder in its place")
         self._covered = _covered_before(path)
         self._saved: set[str] = set()
         self._journal = Journal(path / "journal.jsonl")
