@@ -30,9 +30,9 @@ inverter that loses much a small current shows too little inductance."""
 OTHER_CONNECTION = 3.0
 """All impedances over the plate's (or the inverse) of a motor wired in star for delta. It may be that where this factor makes a plate's
 motor of it: the table's then draw 0.28 ... 0.53 of the plate's current, or 2.5 ... 4.8 times it."""
-WIRED_OTHERWISE = (2.45, 4.2)
-"""The factor that it surely is, a current scale of 2 being no less likely below sqrt(6): geometric mean of the impedances and of the
-current's inverse, in the table 2.67 ... 3.33 but for five motors, whose plates are a factor of 1.27 ... 1.7 off."""
+SURELY_OTHERWISE = 2.45
+"""From which factor on it is said to be that: below sqrt(6) a current scale of 2 is no less likely. The geometric mean of the impedances and
+of the current's inverse is 2.67 ... 3.35 in the table but for five motors, whose plates are a factor of 1.26 ... 1.7 off."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _of_scale(
             "connection (factor 3), and the current sensors' scale",
         )  # fmt: skip
     other, factor = ("star", "three times") if plate.connection == "delta" else ("delta", "a third of")
-    if WIRED_OTHERWISE[0] <= wired_otherwise <= WIRED_OTHERWISE[1]:
+    if wired_otherwise >= SURELY_OTHERWISE:
         what = f"the motor is wired in {other} where the plate says {plate.connection}: all its impedances are {factor} the plate's"
     else:
         what = f"the motor may be wired in {other} where the plate says {plate.connection}, or its currents are off in scale: {what}"

@@ -25,6 +25,7 @@ from commissioner.encoding import plain
 from commissioner.errors import UsageError
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import write_table
+from commissioner.recordings.whole import whole_file
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import append_frame, frame, read_blocks
 from commissioner.run.archive.documents import damaged, open_no_link
@@ -93,12 +94,10 @@ class RunFolder:
 
     def save_text(self, name: str, text: str) -> Path:
         target = self.path / name
-        temporary = target.with_name(name + ".part")
-        with open(temporary, "w", encoding="utf-8", newline="\n", opener=open_no_link) as file:
+        with whole_file(target) as part, open(part, "w", encoding="utf-8", newline="\n", opener=open_no_link) as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(target)
         _sync_folder(self.path)
         self._saved.add(name)
         return target
