@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -100,10 +101,15 @@ Model = TypeVar("Model", bound=BaseModel)
 def load_motor(name_or_path: str) -> Nameplate:
     """The nameplate in `config/motors/NAME.toml` or in a file. ConfigurationError: the plate is impossible."""
     path = _resolve(name_or_path, "motors")
-    model = load(path, MotorFile)
+    return nameplate_of(read_toml(path), str(path))
+
+
+def nameplate_of(document: JsonObject, source: str) -> Nameplate:
+    """As `load_motor`, of what was read already."""
+    model = _checked(document, MotorFile, source)
     nameplate = Nameplate(**model.model_dump(exclude={"name"}))
     for problem in check(nameplate):
-        raise ConfigurationError(file=str(path), key=problem.key, value=problem.value, expected=problem.expected)
+        raise ConfigurationError(file=source, key=problem.key, value=problem.value, expected=problem.expected)
     return nameplate
 
 
@@ -119,16 +125,23 @@ def load_procedure(
     """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes, `strict` its
     leniency."""
     source = path or CONFIG_FOLDER / "procedure.toml"
-    model = load(source, ProcedureFile)
+    planned = plan_of(read_toml(source), str(source))
+    acceptance = replace(planned.acceptance, strict=strict or planned.acceptance.strict)
+    return replace(planned, axes_deg=axes_deg or planned.axes_deg, acceptance=acceptance)
+
+
+def plan_of(document: JsonObject, source: str) -> ProcedurePlan:
+    """The plan that a procedure file's document makes."""
+    model = _checked(document, ProcedureFile, source)
     for key, value, expected in _contradictions(model):
-        raise ConfigurationError(file=str(source), key=key, value=value, expected=expected)
+        raise ConfigurationError(file=source, key=key, value=value, expected=expected)
     return ProcedurePlan(
-        axes_deg=axes_deg or tuple(model.axes.orientations_deg),
+        axes_deg=tuple(model.axes.orientations_deg),
         repeat_first=model.axes.repeat_first,
         supervision=Supervision(**model.supervision.model_dump()),
         limits=Limits(**model.limits.model_dump()),
         excitation=ExcitationPlan(**model.excitation.model_dump()),
-        acceptance=Acceptance(**model.acceptance.model_dump() | {"strict": strict or model.acceptance.strict}),
+        acceptance=Acceptance(**model.acceptance.model_dump()),
     )
 
 
@@ -194,10 +207,14 @@ def _resolve(name_or_path: str, folder: str) -> Path:
 
 def load(path: Path, model: type[Model]) -> Model:
     """ConfigurationError with file, key, value and what would be right."""
+    return _checked(read_toml(path), model, str(path))
+
+
+def _checked(document: JsonObject, model: type[Model], source: str) -> Model:
     try:
-        return model.model_validate(read_toml(path))
+        return model.model_validate(document)
     except ValidationError as error:
         problem = first_problem(error, model)
         raise ConfigurationError(
-            file=str(path), key=problem.key, value=problem.value, expected=problem.expected
+            file=source, key=problem.key, value=problem.value, expected=problem.expected
         ) from error

@@ -16,11 +16,15 @@ _NEVER = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 use, unassigned, line and paragraph separators."""
 
 
+def visible(text: str) -> str:
+    """All of it in one line, each character of which only shows."""
+    return text if text.isprintable() and text.isascii() else "".join(map(_visible, text))
+
+
 def shown(value: object, longest: int = LONGEST) -> str:
     """`str(value)` in one line of at most about `longest` characters, each of which only shows: ESC is `\\x1b`."""
     text = str(value)
-    cut = text[:longest]
-    kept = cut if cut.isprintable() and cut.isascii() else "".join(map(_visible, cut))
+    kept = visible(text[:longest])
     return kept if len(text) <= longest else f"{kept}... ({len(text)} characters)"
 
 

@@ -27,8 +27,12 @@ MOST_INDUCTIVE = 1.95
 """Unsaturated static stator inductance over the plate's typical one: 0.63 ... 1.33 in the table at rated flux; iron that is
 not saturated shows up to 1.4 times as much, and a value from few levels is a tenth off. There is no lower bound: behind an
 inverter that loses much a small current shows too little inductance."""
-WIRED_OTHERWISE = (2.2, 4.2)
-"""All impedances over the plate's (or the inverse): star for delta makes it 3."""
+OTHER_CONNECTION = 3.0
+"""All impedances over the plate's (or the inverse) of a motor wired in star for delta. It may be that where this factor makes a plate's
+motor of it: the table's then draw 0.28 ... 0.53 of the plate's current, or 2.5 ... 4.8 times it."""
+SURELY_OTHERWISE = 2.45
+"""From which factor on it is said to be that: below sqrt(6) a current scale of 2 is no less likely. The geometric mean of the impedances and
+of the current's inverse is 2.67 ... 3.35 in the table but for five motors, whose plates are a factor of 1.26 ... 1.7 off."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ def mismatch(match: PlateMatch, plate: Nameplate) -> PlateMismatch | None:
         return _of_scale(
             "the four parameters together give another rated current than the plate", match.current_ratio,
             f"{CURRENT_RATIO[0]:g} ... {CURRENT_RATIO[1]:g} of the rated current", match.impedance_ratio, plate,
+            _connections_factor(match, plate),
         )  # fmt: skip
     if match.copper_loss_ratio > 1.0:
         return PlateMismatch(
@@ -99,33 +104,46 @@ def sure_mismatch(machine: InverseGamma, resistance_std_ohm: float, plate: Namep
     return mismatch(plate_match(machine, plate), plate) if is_sure else None
 
 
-def inductance_mismatch(inductance_h: float, plate: Nameplate) -> PlateMismatch | None:
+def inductance_mismatch(inductance_h: float, std_h: float, plate: Nameplate) -> PlateMismatch | None:
     """Of the static stator inductance alone, which a first small current tells."""
     typical = prior(plate).typical
-    ratio = inductance_h / (typical.leakage_inductance_h + typical.magnetizing_inductance_h)
-    if ratio <= MOST_INDUCTIVE:
+    typical_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
+    if inductance_h - SURE * std_h <= MOST_INDUCTIVE * typical_h:
         return None
+    ratio = inductance_h / typical_h
+    is_delta = plate.connection == "delta"
     return _of_scale(
         "the inductance is not that of the plate's motor", ratio, f"at most {MOST_INDUCTIVE:g} of the plate's typical",
-        ratio, plate,
+        ratio, plate, ratio if is_delta and ratio <= OTHER_CONNECTION * MOST_INDUCTIVE else None,
     )  # fmt: skip
 
 
-def _of_scale(what: str, value: float, limit: str, impedances: float, plate: Nameplate) -> PlateMismatch:
-    is_delta = plate.connection == "delta"
-    other, factor = ("star", "three times") if is_delta else ("delta", "a third of")
-    if WIRED_OTHERWISE[0] <= (impedances if is_delta else 1.0 / impedances) <= WIRED_OTHERWISE[1]:
+def _connections_factor(match: PlateMatch, plate: Nameplate) -> float | None:
+    """By what the impedances are off, where the other connection would make the plate's motor of it; below 1: in the other way."""
+    off = match.impedance_ratio / match.current_ratio
+    factor, size = (OTHER_CONNECTION, off) if plate.connection == "delta" else (1.0 / OTHER_CONNECTION, 1.0 / off)
+    return math.sqrt(size) if CURRENT_RATIO[0] <= factor * match.current_ratio <= CURRENT_RATIO[1] else None
+
+
+def _of_scale(
+    what: str, value: float, limit: str, impedances: float, plate: Nameplate, wired_otherwise: float | None
+) -> PlateMismatch:
+    """`wired_otherwise`: the factor that may be the other connection's, None where it cannot be one."""
+    if wired_otherwise is None:
         return PlateMismatch(
-            f"the motor is wired in {other} where the plate says {plate.connection}: all its impedances are {factor} "
-            "the plate's",
-            value, limit,
-            f"wire the motor in {plate.connection}, or give the plate's {other} values; if the wiring is right, check the "
-            "current sensors' scale",
+            what, value, limit,
+            f"all impedances are {impedances:.2g} times what the plate's motor has: check that --motor is the motor at the drive, its "
+            "connection (factor 3), and the current sensors' scale",
         )  # fmt: skip
+    other, factor = ("star", "three times") if plate.connection == "delta" else ("delta", "a third of")
+    if wired_otherwise >= SURELY_OTHERWISE:
+        what = f"the motor is wired in {other} where the plate says {plate.connection}: all its impedances are {factor} the plate's"
+    else:
+        what = f"the motor may be wired in {other} where the plate says {plate.connection}, or its currents are off in scale: {what}"
     return PlateMismatch(
         what, value, limit,
-        f"all impedances are {impedances:.2g} times what the plate's motor has: check that --motor is the motor at the drive, its "
-        "connection (factor 3), and the current sensors' scale",
+        f"wire the motor in {plate.connection}, or give the plate's {other} values; if the wiring is right, check the "
+        "current sensors' scale",
     )  # fmt: skip
 
 

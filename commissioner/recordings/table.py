@@ -38,6 +38,7 @@ from commissioner.records import (
     Signal,
     StandstillRecording,
 )
+from commissioner.text import visible
 
 MAX_METADATA_LINES = 1000
 MOST_AVERAGED = 1000
@@ -146,6 +147,7 @@ def check_ending(path: Path) -> None:
 def write_table(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str, float | str]) -> None:
     """Write the table whole or not at all (a temporary file is renamed into place)."""
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    metadata = {k: visible(v) if isinstance(v, str) else v for k, v in metadata.items()}
     with whole_file(path) as temporary:
         if path.suffix == ".mat":
             _write_matlab(temporary, columns, metadata)

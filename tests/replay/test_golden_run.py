@@ -17,8 +17,9 @@ from commissioner.run.archive import replay as replaying
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
-from commissioner.run.archive.replay import replay
+from commissioner.run.archive.replay import learn_again, replay
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
+from tests.support.archive.chained import rechain
 from tests.support.sim_process import SimProcess
 
 ROUNDING = 1e-6
@@ -64,9 +65,8 @@ def test_a_run_made_on_this_machine_is_decided_again_bit_for_bit(fresh):
 
 def test_the_golden_run_is_decided_again(golden):
     journal = read_journal(golden / "journal.jsonl")
-    job = next(line["record"] for line in journal if line["kind"] == "job")
     archived = [line for line in journal if line["kind"] in replaying._DECISIONS]
-    replayed = list(replaying._decide_again(replaying._job(job), Findings(), journal, golden))
+    replayed = list(replaying._decide_again(replaying.read_job(golden, journal), Findings(), journal, golden))
     assert [line["kind"] for line in archived] == [line["kind"] for line in replayed]
     for old, new in zip(archived, replayed, strict=True):
         assert_alike(old["record"], new["record"], old["kind"])
@@ -128,6 +128,38 @@ def test_a_missing_block_is_reported(fresh, tmp_path):
     difference = replay(folder).difference
     assert difference is not None
     assert difference.replayed is None or difference.archived != difference.replayed
+
+
+def _plate(command, value):
+    """Of one command's replies every value."""
+    return lambda r: r.get("command") == command and r.update(reply=dict.fromkeys(r["reply"], value))
+
+
+@pytest.mark.parametrize(
+    ("kind", "forge", "seen"),
+    [
+        ("job", lambda job: job["nameplate"].update(rated_current_a="x"), "rated_current_a"),
+        ("job", lambda job: job["nameplate"].update(rated_frequency_hz=0.0), "rated_frequency_hz"),
+        ("job", lambda job: job["plan"].update(axes_deg=[]), "orientations_deg"),
+        ("job", lambda job: job["plan"]["excitation"].update(seconds=1e300), "excitation.seconds"),
+        ("job", lambda job: job.update(link_latency_s=None), "link_latency_s"),
+        ("job", lambda job: job.update(pace={"round_trip_s": 0.0, "samples": 0, "registers": 0}), "ZeroDivisionError"),
+        ("reply", _plate("ReadStatus", "x"), "AttributeError"),
+        ("reply", _plate("ReadNameplate", "x"), "TypeError"),
+    ],
+)
+def test_what_no_run_was_asked_or_answered_is_damage_and_no_defect(golden, kind, forge, seen):
+    """The chain is right: somebody has computed it anew."""
+
+    def change(line):
+        if line["kind"] == kind:
+            forge(line["record"])
+        return line
+
+    rechain(golden / "journal.jsonl", change)
+    with pytest.raises(DataRefused, match=r"journal\.jsonl is damaged") as refusal:
+        learn_again(golden)
+    assert seen in str(refusal.value.value)
 
 
 def test_a_folder_without_a_job_is_refused(tmp_path):

@@ -59,7 +59,7 @@ def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
     if document["kind"] == "points":
         _parameters(document)
     if document["verdict"] == "nothing_significant" and (limits := _limits(document)):
-        screen.print(f"[dim]would have been seen: {limits}[/]")
+        screen.print(f"[dim]would have been seen: {escape(limits)}[/]")
     for who, what in actions(document):
         screen.print(f"[bold]{who}[/]  {escape(what)}")
     if not (is_on_page and _is_only_together(document)):

@@ -17,7 +17,7 @@ def show_and_exit(done: Commissioned, *, as_json: bool) -> None:
         screen.result(done.result)
         for what, name in (("report", "report.html"), ("samples", "recording.parquet")):
             if (done.folder / name).is_file():
-                screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
+                screen.out.print(f"[dim]{what:<9} {screen.text(done.folder / name)}[/]", soft_wrap=True)
         if done.is_being_diagnosed:
             archive = done.folder.parent
             where = "" if archive == RUNS else f' --runs "{archive}"'

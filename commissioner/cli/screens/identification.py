@@ -15,37 +15,39 @@ ROWS = (
 )
 
 
+def _title(sources: Sequence[str]) -> str:
+    from commissioner.cli.screens.screen import text
+
+    return text("Identified from " + ", ".join(sources))
+
+
 def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     """The result as a table for a technician, with what holds for which flux, and the remarks."""
-    from rich.console import Console
-    from rich.table import Table
+    from commissioner.cli.screens.screen import out, table
 
-    console = Console()
-    table = Table(title="Identified from " + ", ".join(sources), title_justify="left")
-    for heading in ("per phase, star equivalent", "value", "std error", "unit"):
-        table.add_column(heading, justify="left" if heading in ("per phase, star equivalent", "unit") else "right")
+    rows = []
     for label, key, unit, factor in ROWS:
         quantity = document["parameters"][key]
         value, std = factor * quantity["value"], factor * quantity["std"]
-        table.add_row(label, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", unit)
-    console.print(table)
+        rows.append((label, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", unit))
+    out.print(table(_title(sources), ("per phase, star equivalent", "value", "std error", "unit"), rows, right=(1, 2)))
     flux = document["holds_for_stator_flux_wb"]
     rated = document["rated_flux_wb"]["stator_peak"]
-    console.print(f"L_M holds for {flux:.3g} Wb peak stator flux ({flux / rated:.0%} of rated {rated:.3g} Wb).")
+    out.print(f"L_M holds for {flux:.3g} Wb peak stator flux ({flux / rated:.0%} of rated {rated:.3g} Wb).")
     inverter = document["inverter"]
     if inverter["identified"]:
-        console.print(
+        out.print(
             f"Inverter: each leg loses {inverter['leg_error_v']['value']:.2f} V (knee {inverter['knee_a']:.2g} A)."
         )
     white = [a["whiteness"]["is_white"] for a in document["axes"]]
-    console.print(
+    out.print(
         f"{len(white)} axis test(s), {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
         + "{lost_samples} samples lost in {count} gaps.".format(**document["gaps"])
     )
     for finding in document["findings"]:
-        console.print(f"- {finding['sentence']}: {finding['relative_size']:+.2%} (std {finding['relative_std']:.2%})")
+        out.print(f"- {finding['sentence']}: {finding['relative_size']:+.2%} (std {finding['relative_std']:.2%})")
     for remark in document["remarks"]:
-        console.print(f"- {remark}")
+        out.print(f"- {remark}", markup=False)
 
 
 def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
@@ -63,7 +65,7 @@ def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
         rows.append(("inertia J", f"{value:.4g}", f"{std:.2g} ({std / value:.2%})", "", "kg m2"))
     out.print(
         table(
-            "Identified from " + ", ".join(sources),
+            _title(sources),
             ("per phase, star equivalent", "value", "std error", "least by noise", "unit"),
             rows,
         )
@@ -76,7 +78,7 @@ def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     for name, value in document["load"].items():
         out.print(f"load of the start: {name.replace('_', ' ').removesuffix(' nm')} {value:.3g} N m")
     for remark in document["remarks"]:
-        out.print(f"- {remark}")
+        out.print(f"- {remark}", markup=False)
 
 
 def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
@@ -91,7 +93,7 @@ def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     ends = document["at_terminals"]
     rows.append(("between two terminals, R", f"{ends['resistance_uv_ohm']:.5g}", "", "ohm"))
     rows.append(("between two terminals, L idle", f"{1e3 * ends['inductance_uv_h']:.5g}", "", "mH"))
-    title = "Identified from " + ", ".join(sources)
+    title = _title(sources)
     out.print(table(title, ("per phase, star equivalent", "value", "std error", "unit"), rows))
     t, book = document["t_circuit"], document["textbook"]
     w = 2.0 * 3.141592653589793 * book["frequency_hz"]
@@ -118,7 +120,7 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
     found = document["parameters"]
     rows = [(label, *_with_errors(found[key], factor), unit) for label, key, unit, factor in ROWS if key in found]
     heads = ("per phase, star equivalent", "value", "std error", "of the type", "unit")
-    out.print(table("Identified from " + ", ".join(sources), heads, rows))
+    out.print(table(_title(sources), heads, rows))
     circuits = (("one cage at rated slip", document["t_circuit"]), ("two cages", document["double_cage"]))
     lines = [
         ("" if k else words, name, *_with_errors(q, 1.0))

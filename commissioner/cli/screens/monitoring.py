@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from commissioner.cli.screens.screen import err, out, quantity, table, text
+from commissioner.cli.screens.screen import SENTENCE, err, out, quantity, table, text
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.trend.trend import Verdict
@@ -26,7 +26,7 @@ def show_refused(seen: Refused, document: Mapping[str, Any]) -> None:
     _states(document, err)
     for finding in seen.findings:
         if not finding.stops:
-            err.print(f"[dim]{finding.kind}[/] {finding.what}")
+            err.print(f"[dim]{finding.kind}[/] {text(finding.what, SENTENCE)}")
     f = seen.audited.fundamental
     if f is not None:
         err.print(
@@ -82,7 +82,7 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
     _states(document, out)
     wiring = miswired(seen.findings)
     for finding in wiring:
-        out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")
+        out.print(f"[bold yellow]check the probes:[/] {text(finding.what, SENTENCE)} (put right here)")
     out.print(table("", ("", ""), _shaft(seen, document["waveforms"])))
     _load_periods(seen)
     _motor(seen, document["parameters"])
@@ -91,12 +91,12 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
         if (finding not in wiring and finding.kind == "corrected") or (
             finding.kind == "note" and finding.code != "frequency_wander"
         ):
-            out.print(f"[yellow]{finding.kind}[/] {finding.what}")
+            out.print(f"[yellow]{finding.kind}[/] {text(finding.what, SENTENCE)}")
     if verdict is not None:
         colour = "red" if verdict.names else "green"
         out.print(f"[{colour}]{verdict.state.value}[/]" + (": " + ", ".join(verdict.names) if verdict.names else ""))
     for name, path in document.get("files", {}).items():
-        out.print(f"[dim]{name}[/] {path}")
+        out.print(f"[dim]{name}[/] {text(path)}")
 
 
 def _shaft(seen: Observation, waveforms: Mapping[str, Any]) -> list[tuple[str, str]]:

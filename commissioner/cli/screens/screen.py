@@ -12,18 +12,28 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
 from commissioner.run.archive.documents import Loss
-from commissioner.text import LONGEST
-from commissioner.text import shown as visible
+from commissioner.text import LONGEST, visible
+from commissioner.text import shown as cut
 
 SENTENCE = 2000
 """Characters of a failure's facts: they are ours, with somebody else's inside."""
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+
+
+class Terminal(Console):
+    """Obeys markup alone: a control character in any sentence, from wherever it comes, only shows."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str("\n".join(map(visible, text.split("\n"))), **options)
+
+
+out = Terminal(highlight=False)
+err = Terminal(stderr=True, highlight=False)
 
 
 def emit(document: object) -> None:
@@ -77,7 +87,7 @@ def failure(error: CommissionerError) -> None:
 
 def text(value: object, longest: int = LONGEST) -> str:
     """Whatever comes from outside, as it may stand in a line with markup: shown, never obeyed."""
-    return escape(visible(value, longest))
+    return escape(cut(value, longest))
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, right: Iterable[int] = ()) -> Table:

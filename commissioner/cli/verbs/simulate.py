@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commissioner.cli.screens.screen import busy, emit, err
+from commissioner.cli.screens.screen import busy, emit, err, text
 from commissioner.operations.recordings.simulate import SimulateRequest
 from commissioner.operations.recordings.simulate import simulate as carry_out
 
@@ -14,4 +14,4 @@ def simulate(request: SimulateRequest, *, as_json: bool) -> None:
     if as_json:
         emit(done)
     else:
-        err.print(f"{done.samples} samples in {done.segments} segments written to {done.recording}")
+        err.print(f"{done.samples} samples in {done.segments} segments written to {text(done.recording)}")

@@ -83,7 +83,7 @@ def tune(request: TuneRequest, *, yes: bool, as_json: bool, dead_man: bool = Fal
         screen.emit({**done.result, "folder": str(done.folder)})
     else:
         _result(done.result)
-        screen.out.print(f"[dim]report    {done.folder / 'report.html'}[/]", soft_wrap=True)
+        screen.out.print(f"[dim]report    {screen.text(done.folder / 'report.html')}[/]", soft_wrap=True)
     if code := EXIT_CODES[done.ended.outcome]:
         raise SystemExit(code)
 

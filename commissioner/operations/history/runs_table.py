@@ -11,6 +11,7 @@ from commissioner.errors import UsageError
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.recordings.whole import whole_file
+from commissioner.text import visible
 
 TEXTS = (
     "run", "started_utc", "ended_utc", "outcome", "standing", "reason", "written", "drive", "url", "profile", "person", "host",
@@ -35,7 +36,7 @@ def write_table(summaries: Iterable[Mapping[str, Any]], target: Path) -> int:
 
 
 def _row(summary: Mapping[str, Any]) -> dict[str, str | float | None]:
-    row: dict[str, str | float | None] = {name: str(summary.get(name) or "") for name in TEXTS}
+    row: dict[str, str | float | None] = {name: visible(str(summary.get(name) or "")) for name in TEXTS}
     row["drive_serial"] = "" if summary.get("serial_number") is None else str(summary["serial_number"])
     row["energised_s"] = _number(summary.get("energised_s"))
     plate, found = summary.get("motor") or {}, summary.get("parameters") or {}

@@ -20,7 +20,7 @@ from commissioner.identify.inverter.settling import Approach, Settled, settle
 from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
-from commissioner.motor.plate_match import SURE, inductance_mismatch
+from commissioner.motor.plate_match import inductance_mismatch
 from commissioner.motor.standstill import poles_per_s
 from commissioner.procedure.energised import ceilings
 from commissioner.procedure.energised.direct_current import STEER_S, DirectCurrent
@@ -73,8 +73,7 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     findings.axis_s = 0.0
     if findings.first_current is None:
         seen = yield from _first_current(job, findings, axis_deg)
-        surely_h = seen.stator_inductance_h - SURE * seen.stator_inductance_std_h
-        mismatch = inductance_mismatch(surely_h, job.nameplate)
+        mismatch = inductance_mismatch(seen.stator_inductance_h, seen.stator_inductance_std_h, job.nameplate)
         if mismatch is not None:
             return (yield from reject(findings, (Objection(**asdict(mismatch)),)))
     stair = _Stair(job, findings, axis_deg)

@@ -93,5 +93,5 @@ def archive_lost(folder: Path, failure: OSError, so_far: str = "") -> Commission
 
 
 def open_no_link(path: str, flags: int) -> int:
-    """An `opener` that never writes through a symbolic link."""
-    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    """An `opener` that never writes through a symbolic link, nor waits for whoever would read a pipe in the file's place."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)

@@ -25,6 +25,7 @@ from commissioner.encoding import plain
 from commissioner.errors import UsageError
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import write_table
+from commissioner.recordings.whole import whole_file
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import append_frame, frame, read_blocks
 from commissioner.run.archive.documents import damaged, open_no_link
@@ -43,8 +44,8 @@ class RunFolder:
     def __init__(self, path: Path, key: bytes | None = None) -> None:
         self.path, self.key = path, key
         for name in ("journal.jsonl", "blocks.bin"):
-            if (path / name).is_symlink():
-                raise damaged(path, name, "a symbolic link")
+            if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
+                raise damaged(path, name, "a link, a pipe or a folder in its place")
         self._covered = _covered_before(path)
         self._saved: set[str] = set()
         self._journal = Journal(path / "journal.jsonl")
@@ -93,12 +94,10 @@ class RunFolder:
 
     def save_text(self, name: str, text: str) -> Path:
         target = self.path / name
-        temporary = target.with_name(name + ".part")
-        with open(temporary, "w", encoding="utf-8", newline="\n", opener=open_no_link) as file:
+        with whole_file(target) as part, open(part, "w", encoding="utf-8", newline="\n", opener=open_no_link) as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(target)
         _sync_folder(self.path)
         self._saved.add(name)
         return target

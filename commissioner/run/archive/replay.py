@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.link.files.drive_file import archived_profile
-from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import RunEnded
-from commissioner.procedure.link_plan import StreamPace
-from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.report.run.summary import summarise
 from commissioner.run.acting import Announcer
@@ -27,6 +25,7 @@ from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.runner import JUDGED_REPLIES, kind_of
 from commissioner.safety import commands as ask
+from commissioner.settings import nameplate_of, plan_of
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,10 @@ class Replayed:
 
 class _ArchiveEnds(Exception):
     pass
+
+
+_NO_RUNS = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError)
+"""What values that no run has had make of whatever thinks with them."""
 
 
 def replay(folder: Path, *, salvage: bool = False) -> Replayed:
@@ -147,8 +150,8 @@ def read_job(folder: Path, journal: list[dict[str, Any]]) -> Job:
             limit="a run that reached its drive and tested the motor", remedy="replay another run",
         )  # fmt: skip
     try:
-        return _job(record)
-    except (TypeError, KeyError, ValueError, AttributeError) as error:
+        return _job(record, f"{folder.name}/journal.jsonl")
+    except (CommissionerError, *_NO_RUNS) as error:
         raise damaged(folder, "journal.jsonl", f"its job: {error}") from error
 
 
@@ -190,6 +193,8 @@ def _decide_again(
             yield _end(plain(stop.value))
     except (_ArchiveEnds, CommissionerError):
         return
+    except _NO_RUNS as error:
+        raise damaged(folder, "journal.jsonl", f"its answers: {type(error).__name__}: {error}") from error
 
 
 def _blocks_to_the_first_loss(path: Path) -> Iterator[SampleBlock]:
@@ -213,7 +218,7 @@ def _answer(command: ask.Command, replies: Iterator[dict[str, Any]], blocks: Ite
         raise _ArchiveEnds
     try:
         return _READ[held["command"]](held["reply"])
-    except (TypeError, KeyError, ValueError):  # cut short or changed: it is compared up to here
+    except _NO_RUNS:  # cut short or changed: it is compared up to here
         raise _ArchiveEnds from None
 
 
@@ -242,24 +247,20 @@ def _first_difference(
     return None
 
 
-def _job(record: Mapping[str, Any]) -> Job:
-    plan = record["plan"]
-    return Job(
-        plan=ProcedurePlan(
-            axes_deg=tuple(plan["axes_deg"]), repeat_first=plan["repeat_first"],
-            supervision=Supervision(**plan["supervision"]), limits=Limits(**plan["limits"]),
-            excitation=ExcitationPlan(**plan["excitation"]), acceptance=Acceptance(**plan["acceptance"]),
-        ),
-        nameplate=Nameplate(**record["nameplate"]),
-        drive_limits=DriveLimits(
-            **{k: _number(v, -math.inf if "_min_" in k else math.inf) for k, v in record["drive_limits"].items()}
-        ),
-        parameter_names=record["parameter_names"],
-        write_back=record["write_back"],
-        link_latency_s=record["link_latency_s"],
-        parameter_factors=record.get("parameter_factors", {}),
-        pace=StreamPace(**record["pace"]) if record.get("pace") else None,
-    )  # fmt: skip
+def _job(record: Mapping[str, Any], source: str) -> Job:
+    """Held to what a motor's and a procedure's file are held to: nobody can have asked for another one."""
+    plan = dict(record["plan"])
+    axes = {"orientations_deg": plan.pop("axes_deg"), "repeat_first": plan.pop("repeat_first")}
+    return TypeAdapter(Job).validate_python(
+        {
+            **record,
+            "plan": plan_of({"axes": axes, **plan}, source),
+            "nameplate": nameplate_of(record["nameplate"], source),
+            "drive_limits": {
+                k: _number(v, -math.inf if "_min_" in k else math.inf) for k, v in record["drive_limits"].items()
+            },
+        }
+    )
 
 
 def _number(value: Any, otherwise: float) -> Any:

@@ -1,11 +1,13 @@
 """A console that lacks a sign gets its spelling."""
 
 import io
+import re
 import sys
 
 import pytest
 
 from commissioner.cli.console import degrade_output
+from commissioner.cli.screens import identification, screen
 from commissioner.cli.verbs.ports import url_of
 from commissioner.link.wire.url import RtuUrl, parse_url
 
@@ -27,6 +29,29 @@ def test_a_sign_that_the_console_lacks_is_spelled_out(monkeypatch, text, encodin
     sys.stdout.write(text)
     sys.stdout.flush()
     assert raw.getvalue().decode(encoding) == seen
+
+
+@pytest.mark.parametrize(
+    "show", [screen.out.print, lambda text: screen.out.print(screen.table(text, (text,), [(text,)]))]
+)
+def test_a_control_character_only_shows_wherever_it_stands(capsys, show):
+    """The reason of an edited result cleared the screen of whoever looked at it."""
+    show("[bold]one[/]\x1b[2J\x9b31m\u202e\ntwo")
+    seen = capsys.readouterr().out
+    assert "one\\x1b[2J\\x9b31m\\u202e" in seen and "two" in seen and "bold" not in seen
+    assert not re.search(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e]", seen)
+
+
+def test_a_file_named_like_markup_is_named(capsys):
+    of = {"value": 1.0, "std": 0.1}
+    document = {
+        "parameters": dict.fromkeys((key for _, key, _, _ in identification.ROWS), of), "holds_for_stator_flux_wb": 1.0,
+        "rated_flux_wb": {"stator_peak": 1.0}, "inverter": {"identified": False}, "axes": [], "duration_s": 1.0,
+        "gaps": {"lost_samples": 0, "count": 0}, "findings": [], "remarks": ["[/dim] of [ma]"],
+    }  # fmt: skip
+    identification.show(document, ["[/red].csv"])
+    seen = capsys.readouterr().out
+    assert "[/red].csv" in seen and "[/dim] of [ma]" in seen
 
 
 @pytest.mark.parametrize("device", ["COM3", "/dev/ttyUSB0", "/dev/serial/by-id/usb-FTDI_FT232R-if00-port0"])

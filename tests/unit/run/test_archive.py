@@ -16,7 +16,7 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import export_run
 from commissioner.operations.history.runs import Archive as RunFolders
 from commissioner.operations.history.runs import Wanted, find_runs, index_runs, show_run, write_runs
-from commissioner.recordings.table import read_table, to_standstill
+from commissioner.recordings.table import read_table, to_standstill, write_table
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_run
@@ -248,6 +248,17 @@ def test_samples_are_not_exported_past_a_damaged_journal(tmp_path):
     journal.write_text(journal.read_text("utf-8").replace("anna", "bert"), "utf-8")
     with pytest.raises(DataRefused, match=r"journal\.jsonl is not as the run left it"):
         export_run(tmp_path, run, tmp_path / "out.csv")
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_run_whose_name_is_no_line_of_text_is_written_into_tables(tmp_path, ending):
+    name = os.fsdecode(b"20260101-\xff\n1,2")
+    make_run(tmp_path, name, result=result_of(name, MACHINE))
+    assert write_runs(RunFolders(tmp_path), Wanted(), tmp_path / f"runs.{ending}").runs == 1
+    target = tmp_path / f"recording.{ending}"
+    write_table(target, {"time_s": np.array([0.0, 1e-3]), "x": np.array([1.0, 2.0])}, {"run": name})
+    read = read_table(target)
+    assert read.metadata["run"] == r"20260101-\udcff\n1,2" and read.columns["time_s"].size == 2
 
 
 def test_an_outcome_that_no_run_has_is_refused(tmp_path):

@@ -174,3 +174,14 @@ def test_a_saved_document_and_its_name_are_on_the_disk(folder, monkeypatch):
     monkeypatch.setattr(os, "fsync", noted)
     folder.save("snapshot.json", dataclasses.asdict(DisarmReport(True, "off", (), False)))
     assert synced == [folder.path / "snapshot.json.part", folder.path]
+
+
+def test_a_document_that_the_disk_does_not_take_leaves_nothing(folder, monkeypatch):
+    def full(_descriptor):
+        raise OSError(errno.ENOSPC, "no space left")
+
+    monkeypatch.setattr(os, "fsync", full)
+    before = sorted(path.name for path in folder.path.iterdir())
+    with pytest.raises(OSError, match="no space left"):
+        folder.save("result.json", {"outcome": "commissioned"})
+    assert sorted(path.name for path in folder.path.iterdir()) == before

@@ -2,7 +2,9 @@
 
 import errno
 import json
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -187,6 +189,21 @@ def test_a_link_in_a_run_folder_is_not_written_through(bench, tmp_path, name):
     with pytest.raises(DataRefused, match=name):
         RunFolder(bench.folder.path)
     assert victim.read_text() == "one\nprecious"
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, pytest.param(os.mkfifo, id="pipe")])
+def test_what_is_no_file_in_a_run_folder_is_not_waited_for(bench, make):
+    """A restore once hung at a pipe, the drive taken."""
+    (bench.folder.path / "blocks.bin").unlink()
+    make(bench.folder.path / "blocks.bin")
+    with pytest.raises(DataRefused, match=r"blocks\.bin is damaged"):
+        bench.restore()
+
+
+def test_a_pipe_where_a_file_is_being_made_is_not_waited_for(bench):
+    os.mkfifo(bench.folder.path / "result.json.part")
+    with pytest.raises(OSError, match="No such device"):
+        bench.folder.save("result.json", {})
 
 
 def test_a_block_that_is_written_short_leaves_no_torn_record(bench):

@@ -38,12 +38,12 @@ def compare_drive(folder: Path, run: str, drive: str | None, *, as_json: bool) -
 def _show(done: Compared) -> None:
     comparison = done.comparison
     rows = [(c.parameter, f"{100 * c.relative_change:+.2f} %", f"{c.sigmas:.1f}") for c in comparison.changes]
-    screen.out.print(f"[bold]{comparison.verdict.value}[/]\n  {comparison.reason}")
+    screen.out.print(f"[bold]{comparison.verdict.value}[/]\n  {screen.text(comparison.reason)}")
     screen.out.print(screen.table("", ("parameter", "change", "standard errors"), rows, right=(1, 2)))
     if done.explained_by:
         screen.out.print("  each of these alone would explain it:")
     for one in done.explained_by:
-        screen.out.print(f"    {one.sentence}")
+        screen.out.print(f"    {screen.text(one.sentence)}")
     for sentence in done.common.sentences:
         screen.out.print(f"  [dim]•[/] {screen.text(sentence)}")
 

@@ -114,7 +114,7 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
     if as_json:
         screen.emit(done)
     else:
-        screen.out.print(done.report, soft_wrap=True)
+        screen.out.print(screen.text(done.report), soft_wrap=True)
         screen.losses(done.run, done.losses)
 
 
@@ -135,4 +135,4 @@ def export_run(folder: Path, name: str, out: Path, form: str, *, as_json: bool, 
     if as_json:
         screen.emit(done)
     else:
-        screen.out.print(f"{done.samples} samples in {done.recording}", soft_wrap=True)
+        screen.out.print(f"{done.samples} samples in {screen.text(done.recording)}", soft_wrap=True)
