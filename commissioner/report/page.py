@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from jinja2 import Environment
 from markupsafe import Markup, escape
 
+from commissioner.motor.quantities import FIVE
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -45,13 +47,7 @@ PLOT_STYLE: dict[Any, Any] = {
 }
 
 
-MACHINE = (
-    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
-    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
-    ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
-    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
-    ("rotor_time_constant_s", "rotor time constant", 1.0, "s"),
-)
+MACHINE = tuple((q.field, q.name, q.factor, q.unit) for q in FIVE)
 """What a motor is known by: key, name, factor and unit in which it is shown."""
 
 

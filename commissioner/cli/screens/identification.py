@@ -6,13 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-ROWS = (
-    ("stator resistance R_s", "stator_resistance_ohm", "ohm", 1.0),
-    ("rotor resistance R_R", "rotor_resistance_ohm", "ohm", 1.0),
-    ("leakage inductance L_sigma", "leakage_inductance_h", "mH", 1e3),
-    ("magnetizing inductance L_M", "magnetizing_inductance_h", "mH", 1e3),
-    ("rotor time constant", "rotor_time_constant_s", "s", 1.0),
-)
+from commissioner.motor.quantities import FIVE
 
 
 def _title(sources: Sequence[str]) -> str:
@@ -26,10 +20,10 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     from commissioner.cli.screens.screen import out, table
 
     rows = []
-    for label, key, unit, factor in ROWS:
-        quantity = document["parameters"][key]
-        value, std = factor * quantity["value"], factor * quantity["std"]
-        rows.append((label, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", unit))
+    for q in FIVE:
+        quantity = document["parameters"][q.field]
+        value, std = q.factor * quantity["value"], q.factor * quantity["std"]
+        rows.append((q.name, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", q.unit))
     out.print(table(_title(sources), ("per phase, star equivalent", "value", "std error", "unit"), rows, right=(1, 2)))
     flux = document["holds_for_stator_flux_wb"]
     rated = document["rated_flux_wb"]["stator_peak"]
@@ -55,11 +49,11 @@ def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     from commissioner.cli.screens.screen import out, table
 
     rows = []
-    for label, key, unit, factor in ROWS:
-        quantity = document["parameters"][key]
-        value, std = factor * quantity["value"], factor * quantity["std"]
-        bound = factor * document["bound_std"][key]
-        rows.append((label, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", f"{bound:.2g}", unit))
+    for q in FIVE:
+        quantity = document["parameters"][q.field]
+        value, std = q.factor * quantity["value"], q.factor * quantity["std"]
+        bound = q.factor * document["bound_std"][q.field]
+        rows.append((q.name, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", f"{bound:.2g}", q.unit))
     if document["inertia_kg_m2"]:
         value, std = document["inertia_kg_m2"]["value"], document["inertia_kg_m2"]["std"]
         rows.append(("inertia J", f"{value:.4g}", f"{std:.2g} ({std / value:.2%})", "", "kg m2"))
@@ -86,12 +80,12 @@ def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     from commissioner.cli.screens.screen import out, table
 
     rows = []
-    for label, key, unit, factor in ROWS:
-        quantity = document["parameters"][key]
-        std = "not known" if quantity["std"] is None else f"{factor * quantity['std']:.2g}"
-        rows.append((label, f"{factor * quantity['value']:.5g}", std, unit))
+    for q in FIVE:
+        quantity = document["parameters"][q.field]
+        std = "not known" if quantity["std"] is None else f"{q.factor * quantity['std']:.2g}"
+        rows.append((q.name, f"{q.factor * quantity['value']:.5g}", std, q.unit))
     ends = document["at_terminals"]
-    rows.append(("between two terminals, R", f"{ends['resistance_uv_ohm']:.5g}", "", "ohm"))
+    rows.append(("between two terminals, R", f"{ends['resistance_uv_ohm']:.5g}", "", "Ω"))
     rows.append(("between two terminals, L idle", f"{1e3 * ends['inductance_uv_h']:.5g}", "", "mH"))
     title = _title(sources)
     out.print(table(title, ("per phase, star equivalent", "value", "std error", "unit"), rows))
@@ -118,7 +112,7 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
     from commissioner.cli.screens.screen import out, table
 
     found = document["parameters"]
-    rows = [(label, *_with_errors(found[key], factor), unit) for label, key, unit, factor in ROWS if key in found]
+    rows = [(q.name, *_with_errors(found[q.field], q.factor), q.unit) for q in FIVE if q.field in found]
     heads = ("per phase, star equivalent", "value", "std error", "of the type", "unit")
     out.print(table(_title(sources), heads, rows))
     circuits = (("one cage at rated slip", document["t_circuit"]), ("two cages", document["double_cage"]))

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
+from commissioner.motor.quantities import FIVE
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
 from commissioner.run.archive.documents import Loss
 from commissioner.text import LONGEST, visible
@@ -135,13 +136,6 @@ _MARKS = {
     "aborted": "[yellow]■ aborted[/]",
     "faulted": "[red]✗ faulted[/]",
 }
-ROWS = (
-    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
-    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
-    ("leakage_inductance_h", "leakage inductance L_σ", 1e3, "mH"),
-    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
-    ("rotor_time_constant_s", "rotor time constant", 1e3, "ms"),
-)
 
 
 def outcome_mark(standing: str) -> str:
@@ -192,17 +186,17 @@ def seconds(energised_s: float | None) -> str:
 def _rows(document: Mapping[str, Any], done: str) -> Iterable[Sequence[str]]:
     before = document.get("before") or {}
     written = {row["field"] for row in document.get("written", ())}
-    for name, words, factor, unit in ROWS:
-        quantity_ = document["parameters"].get(name)
+    for q in FIVE:
+        quantity_ = document["parameters"].get(q.field)
         if quantity_ is None:
             continue
         value, std = quantity_["value"], quantity_["std"]
-        old = before.get(name)
+        old = before.get(q.field)
         yield (
-            words,
-            f"{factor * value:.4g} {unit}",
+            q.name,
+            f"{q.factor * value:.4g} {q.unit}",
             f"{100 * std / abs(value):.2f} %",
-            "" if old is None else f"{factor * old:.4g} {unit}",
+            "" if old is None else f"{q.factor * old:.4g} {q.unit}",
             "" if not old else f"{100 * (value / old - 1):+.1f} %",
-            done if name in written else "",
+            done if q.field in written else "",
         )

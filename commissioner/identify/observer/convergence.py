@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from commissioner.identify.observer.observer import BlockEstimate
-
-NAMES = ("stator resistance", "rotor resistance", "leakage inductance", "magnetizing inductance")
+from commissioner.motor.quantities import FOUR
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ def settled(
     if since is None:
         return Settling(False, nothing, _four(std), f"less than {window_s:g} s of estimates")
     drift = tuple(abs(a / b - 1.0) for a, b in zip(since.parameters.as_tuple(), values, strict=True))
-    for name, moved, s, allowed in zip(NAMES, drift, std, allowed_std, strict=True):
+    for name, moved, s, allowed in zip((q.words for q in FOUR), drift, std, allowed_std, strict=True):
         if s > allowed:
             return Settling(False, _four(drift), _four(std), f"{name}: standard error {s:.2%}, allowed {allowed:.2%}")
         if moved > max(3.0 * s, allowed / 3.0):

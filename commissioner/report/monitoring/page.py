@@ -10,19 +10,13 @@ from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.result import why_no_load_torque
 from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import FALSE_ALARM, History, Verdict
+from commissioner.motor.quantities import FIVE
 from commissioner.records import RPM
 from commissioner.report import band
 from commissioner.report.monitoring import figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
 
 _WIRING = {"crossed_channels": "channels are crossed", "polarity": "a channel is inverted"}
-_MOTOR = (
-    ("stator resistance R_s", 1.0, "Ω"),
-    ("rotor resistance R_R", 1.0, "Ω"),
-    ("leakage inductance L_σ", 1e3, "mH"),
-    ("magnetizing inductance L_M", 1e3, "mH"),
-    ("rotor time constant", 1e3, "ms"),
-)
 
 
 def page_of(
@@ -217,8 +211,9 @@ def _motor(seen: Observation, document: Mapping[str, Any]) -> Section:
         Table(
             ("parameter (inverse-Gamma circuit)", "value", "standard deviation"),
             [
-                (words, f"{factor * q['value']:.4g} {unit}", f"{q['std'] / q['value']:.1%}")
-                for (key, q), (words, factor, unit) in zip(parameters.items(), _MOTOR, strict=True)
+                (q.name, f"{q.factor * found['value']:.4g} {q.unit}", f"{found['std'] / found['value']:.1%}")
+                for q in FIVE
+                for found in [parameters[q.field]]
             ],
             caption=f"Fitted to this recording, started from: {seen.start.origin}.",
         ),

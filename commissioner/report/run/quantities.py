@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
+from commissioner.motor.quantities import FIVE
 from commissioner.report.sheet import marks
 
 
@@ -20,12 +21,9 @@ class Quantity:
     unit: str
 
 
-QUANTITIES = (
-    Quantity("stator_resistance_ohm", marks.R_S, "stator resistance", 1.0, "Ω"),
-    Quantity("rotor_resistance_ohm", marks.R_R, "rotor resistance", 1.0, "Ω"),
-    Quantity("leakage_inductance_h", marks.L_SIGMA, "leakage inductance", 1e3, "mH"),
-    Quantity("magnetizing_inductance_h", marks.L_M, "magnetizing inductance", 1e3, "mH"),
-    Quantity("rotor_time_constant_s", marks.T_R, "rotor time constant", 1e3, "ms"),
+_SYMBOLS = (marks.R_S, marks.R_R, marks.L_SIGMA, marks.L_M, marks.T_R)
+QUANTITIES = tuple(
+    Quantity(q.field, symbol, q.words, q.factor, q.unit) for q, symbol in zip(FIVE, _SYMBOLS, strict=True)
 )
 FOUR = QUANTITIES[:4]
 """What standstill data fix."""

@@ -10,6 +10,7 @@ from commissioner.cli.console import degrade_output
 from commissioner.cli.screens import identification, screen
 from commissioner.cli.verbs.ports import url_of
 from commissioner.link.wire.url import RtuUrl, parse_url
+from commissioner.motor.quantities import FIVE
 
 
 @pytest.mark.parametrize(
@@ -45,7 +46,7 @@ def test_a_control_character_only_shows_wherever_it_stands(capsys, show):
 def test_a_file_named_like_markup_is_named(capsys):
     of = {"value": 1.0, "std": 0.1}
     document = {
-        "parameters": dict.fromkeys((key for _, key, _, _ in identification.ROWS), of), "holds_for_stator_flux_wb": 1.0,
+        "parameters": dict.fromkeys((q.field for q in FIVE), of), "holds_for_stator_flux_wb": 1.0,
         "rated_flux_wb": {"stator_peak": 1.0}, "inverter": {"identified": False}, "axes": [], "duration_s": 1.0,
         "gaps": {"lost_samples": 0, "count": 0}, "findings": [], "remarks": ["[/dim] of [ma]"],
     }  # fmt: skip

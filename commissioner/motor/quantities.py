@@ -1,0 +1,32 @@
+"""The five numbers a motor is known by: what people call them, and in which unit they are shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """`field` names the value in SI; times `factor` it is in `unit`. `symbol` in plain text, empty where the words do."""
+
+    field: str
+    words: str
+    symbol: str
+    factor: float
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """Words and symbol."""
+        return f"{self.words} {self.symbol}".rstrip()
+
+
+FIVE = (
+    Quantity("stator_resistance_ohm", "stator resistance", "R_s", 1.0, "Ω"),
+    Quantity("rotor_resistance_ohm", "rotor resistance", "R_R", 1.0, "Ω"),
+    Quantity("leakage_inductance_h", "leakage inductance", "L_σ", 1e3, "mH"),
+    Quantity("magnetizing_inductance_h", "magnetizing inductance", "L_M", 1e3, "mH"),
+    Quantity("rotor_time_constant_s", "rotor time constant", "", 1e3, "ms"),
+)
+FOUR = FIVE[:4]
+"""What standstill data fix; the fifth follows."""
