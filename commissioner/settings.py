@@ -114,8 +114,7 @@ def load_procedure(
     leniency."""
     source = path or CONFIG_FOLDER / "procedure.toml"
     model = load(source, ProcedureFile)
-    for key, value, expected in _contradictions(model):
-        raise ConfigurationError(file=str(source), key=key, value=value, expected=expected)
+    must_agree(model, str(source))
     return ProcedurePlan(
         axes_deg=axes_deg or tuple(model.axes.orientations_deg),
         repeat_first=model.axes.repeat_first,
@@ -124,6 +123,12 @@ def load_procedure(
         excitation=ExcitationPlan(**model.excitation.model_dump()),
         acceptance=Acceptance(**model.acceptance.model_dump() | {"strict": strict or model.acceptance.strict}),
     )
+
+
+def must_agree(model: ProcedureFile, source: str) -> None:
+    """ConfigurationError where a value of the procedure cannot go with another."""
+    for key, value, expected in _contradictions(model):
+        raise ConfigurationError(file=source, key=key, value=value, expected=expected)
 
 
 def _contradictions(model: ProcedureFile) -> Iterator[tuple[str, float, str]]:
