@@ -56,12 +56,7 @@ def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Ca
     """In order; the same file gives the same cases. ConfigurationError: an unknown motor, or no file fits."""
     if study.kind != "commission":
         return _of_files(study, path)
-    names = list(motors) if study.motors == "all" else list(study.motors)
-    for name in names:
-        if name not in motors and not Path(name).is_file():
-            raise ConfigurationError(
-                file=str(path), key="motors", value=name, expected=f"a file, or one of: {', '.join(motors)}"
-            )
+    names = list(motors) if study.motors == "all" else [_motor(name, path, motors) for name in study.motors]
     effects = (study.effects,) if isinstance(study.effects, str) else tuple(study.effects)
     seeds = np.random.default_rng(study.seed).integers(0, 2**31, study.runs)
     return [
@@ -71,6 +66,17 @@ def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Ca
         )
         for number, seed in enumerate(seeds)
     ]  # fmt: skip
+
+
+def _motor(name: str, path: Path, motors: Sequence[str]) -> str:
+    """As named where it is known or a file here; else the file beside the study's."""
+    if name in motors or Path(name).is_file():
+        return name
+    if (path.parent / name).is_file():
+        return str(path.parent / name)
+    raise ConfigurationError(
+        file=str(path), key="motors", value=name, expected=f"a scenario's file, or one of: {', '.join(motors)}"
+    )
 
 
 def _of_files(study: Specification, path: Path) -> list[Case]:

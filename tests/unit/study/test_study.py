@@ -280,3 +280,11 @@ def test_a_folder_that_does_not_say_its_study_any_more_is_refused(tmp_path, spoi
 def test_what_is_no_address_of_a_scheduler_is_told_before_anyone_is_called(address):
     with pytest.raises(UsageError, match="no scheduler's address"):
         next(on_cluster([], address))
+
+
+def test_a_motor_file_beside_the_study_is_found_from_anywhere(tmp_path):
+    (tmp_path / "mein Prüfling.toml").write_text("", "utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text('kind = "commission"\nruns = 1\nmotors = ["mein Prüfling.toml"]\n', "utf-8")
+    (case,) = cases_of(load(path, Specification), path, MOTORS)
+    assert case.motor == str(tmp_path / "mein Prüfling.toml")
