@@ -31,6 +31,8 @@ from typing_extensions import TypedDict
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
+NOTHING = "nothing"
+"""The value seen where there is none: a key that is missing."""
 OF_DISK = frozenset({errno.ENOSPC, errno.EROFS, errno.EIO, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """What a disk says that takes no more, or fails."""
 
@@ -56,7 +58,7 @@ class CommissionerError(Exception):
         super().__init__(what)
         self.what = what
         self.step = step
-        self.value = value
+        self.value = NOTHING if value is None else value
         self.limit = limit
         self.remedy = remedy
 
@@ -81,7 +83,7 @@ class ConfigurationError(UsageError):
     """A file said something that cannot be right."""
 
     def __init__(self, *, file: str, key: str, value: object, expected: str) -> None:
-        shown = "nothing" if value is None else _SHORT.repr(value)
+        shown = NOTHING if value is None else _SHORT.repr(value)
         super().__init__(
             f"{file}: {key} is missing" if value is None else f"{file}: {key} = {shown} cannot be used",
             step="read configuration",

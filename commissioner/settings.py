@@ -133,8 +133,7 @@ def load_procedure(
 def plan_of(document: JsonObject, source: str) -> ProcedurePlan:
     """The plan that a procedure file's document makes."""
     model = _checked(document, ProcedureFile, source)
-    for key, value, expected in _contradictions(model):
-        raise ConfigurationError(file=source, key=key, value=value, expected=expected)
+    must_agree(model, source)
     return ProcedurePlan(
         axes_deg=tuple(model.axes.orientations_deg),
         repeat_first=model.axes.repeat_first,
@@ -143,6 +142,12 @@ def plan_of(document: JsonObject, source: str) -> ProcedurePlan:
         excitation=ExcitationPlan(**model.excitation.model_dump()),
         acceptance=Acceptance(**model.acceptance.model_dump()),
     )
+
+
+def must_agree(model: ProcedureFile, source: str) -> None:
+    """ConfigurationError where a value of the procedure cannot go with another."""
+    for key, value, expected in _contradictions(model):
+        raise ConfigurationError(file=source, key=key, value=value, expected=expected)
 
 
 def _contradictions(model: ProcedureFile) -> Iterator[tuple[str, float, str]]:

@@ -312,7 +312,7 @@ def simulate(
     model: Annotated[
         str,
         typer.Argument(
-            help="A model.json of diagnose or identify, a manufacturer's sheet, or a motor's name or TOML file."
+            help="A model.json of diagnose or identify, a manufacturer's sheet, or a motor's or drive's name or TOML file."
         ),
     ],
     out: Annotated[Path, typer.Option("--out", help="The recording to write: .csv, .csv.gz or .parquet.")],

@@ -186,6 +186,8 @@ class ThreeTestsDocument(TypedDict):
     """`identify` of test sheets: direct current, no load, locked rotor. `t_circuit` and `losses` by their SI names; null: the tests do
     not tell it; `rows`: of each test."""
 
+    outcome: str
+    reason: str
     kind: str
     method: str
     convention: str
@@ -236,6 +238,8 @@ class Silence:
 class SheetDocument(TypedDict):
     """`identify` of a manufacturer's sheet; `withheld`: what each parameter that it does not tell would need."""
 
+    outcome: str
+    reason: str
     kind: str
     method: str
     convention: str

@@ -8,11 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from commissioner.errors import CommissionerError, DataRefused, UsageError
+from commissioner.errors import CommissionerError, DataRefused
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import check_ending, write_table
 from commissioner.run.archive.blocks import read_blocks
-from commissioner.run.archive.catalogue import find_folder, find_run, run_folders
+from commissioner.run.archive.catalogue import find_folder, find_run, must_be_archive, run_folders
 from commissioner.run.archive.documents import Loss, damaged, read_saved
 from commissioner.run.archive.replay import Difference, replay
 from commissioner.run.archive.verify import DAMAGED, Verified, losses_at_sight, refuse_damage, verify
@@ -86,11 +86,7 @@ def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exp
 
 def verify_runs(runs: Path, run: str | None, key: bytes | None = None) -> tuple[Verified, ...]:
     """One run, or all of them where `run` is None, and what the index says of them. UsageError: there is no such archive."""
-    if not runs.is_dir():
-        raise UsageError(
-            f"{runs} is no folder", step="archive", value=str(runs), limit="the folder of an archive",
-            remedy="give it with --runs",
-        )  # fmt: skip
+    must_be_archive(runs)
     folders = run_folders(runs) if run is None else [find_folder(runs, run)]
     differ: Mapping[str, str] = {}
     with suppress(sqlite3.Error):  # an index that cannot be had is done without

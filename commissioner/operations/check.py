@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from commissioner.encoding import HIDDEN
-from commissioner.errors import CheckFailed
+from commissioner.errors import CheckFailed, ErrorDocument
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import CheckResult, NotChecked, check_failed
 from commissioner.procedure.plan import ProcedurePlan
@@ -49,10 +49,11 @@ class RunLimits:
 
 @dataclass(frozen=True)
 class Checked:
-    """`outcome` passed | rejected. `limits`: None of a drive that cannot energise for us."""
+    """`outcome` passed | rejected. `error`: the first check that says no. `limits`: None of a drive that cannot energise for us."""
 
     outcome: str
     reason: str
+    error: ErrorDocument | None
     drive: DriveIdentity
     nameplate_in_drive: Mapping[str, float]
     parameters_in_drive: Mapping[str, float]
@@ -79,6 +80,7 @@ def check(request: CheckRequest) -> Checked:
     return Checked(
         outcome="rejected" if failure else "passed",
         reason=failure.what if failure else _passed(seen),
+        error=failure.as_dict() if failure else None,
         drive=seen.identity,
         nameplate_in_drive=seen.nameplate,
         parameters_in_drive=seen.parameters,

@@ -71,7 +71,7 @@ def as_error(surprise: Exception, folder: RunFolder) -> CommissionerError:
         )  # fmt: skip
     return CommissionerError(
         f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
-        remedy="please report it with the run folder",
+        value=type(surprise).__name__, limit="no such error", remedy="please report it with the run folder",
     )  # fmt: skip
 
 

@@ -19,10 +19,10 @@ from commissioner.recordings.whole import write_text
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
 from commissioner.service.problems import Refusal
-from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
+from commissioner.settings import CONFIG_FOLDER, MotorFile, ProcedureFile, load_motor, must_agree, read_toml
 from commissioner.validation import requirement
 
-SIMULATOR = "simulator"
+SIMULATOR, STANDARD = "simulator", "standard"
 PLATE_FIELDS = tuple(name for name in MotorFile.model_fields if name != "name")
 TYPICAL_EFFICIENCY = ((500.0, 0.45, 0.80), (3e3, 0.65, 0.90), (30e3, 0.78, 0.955), (math.inf, 0.86, 0.98))
 """Up to a rated power: the efficiencies of ordinary motors, IE1 (IEC 60034-30-1) less some points to the best sold."""
@@ -50,7 +50,16 @@ class Motor:
     plate: Nameplate
 
 
-Known = TypeVar("Known", Drive, Motor)
+@dataclass(frozen=True)
+class Procedure:
+    """`origin`: packaged | added."""
+
+    id: str
+    path: Path
+    origin: str
+
+
+Known = TypeVar("Known", Drive, Motor, Procedure)
 
 
 class Library:
@@ -107,6 +116,24 @@ class Library:
         rows = [f"{key} = {json.dumps(value)}" for key, value in table.model_dump().items() if value is not None]
         _write(self._data / "motors" / f"{identifier}.toml", "\n".join(rows) + "\n")
         return self.motor(identifier)
+
+    def procedures(self) -> list[Procedure]:
+        """The one that ships with the product first."""
+        added = [Procedure(path.stem, path, "added") for path in self._files("procedures", "toml")]
+        return [Procedure(STANDARD, CONFIG_FOLDER / "procedure.toml", "packaged"), *added]
+
+    def procedure(self, identifier: str) -> Procedure:
+        return _found(self.procedures(), identifier, "procedure")
+
+    def put_procedure(self, identifier: str, table: ProcedureFile) -> Procedure:
+        """Keep a procedure, new or changed. UsageError: its values contradict each other, or the id is the packaged one's."""
+        must_agree(table, f"procedure {identifier}")
+        _must_be_new([STANDARD], identifier)
+        rows = []
+        for name, values in table.model_dump().items():
+            rows += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in values.items()), ""]
+        _write(self._data / "procedures" / f"{identifier}.toml", "\n".join(rows))
+        return self.procedure(identifier)
 
     def profiles(self) -> list[str]:
         """Names of the drive files that ship with the product."""

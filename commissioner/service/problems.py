@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
-from commissioner.errors import Aborted, CommissionerError, DataRefused, DriveError, UsageError
+from commissioner.errors import NOTHING, Aborted, CommissionerError, DataRefused, DriveError, UsageError
 from commissioner.validation import wanted
 
 MEDIA_TYPE = "application/problem+json"
@@ -129,13 +129,21 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
         return answer(
             request,
             Refusal(
-                error.status_code, title, headers=headers, step="route", remedy="/openapi.json lists what there is"
+                error.status_code,
+                title,
+                headers=headers,
+                step="route",
+                value=_shown(f"{request.method} {request.url.path}"),
+                limit="a route and a method of /openapi.json",
+                remedy="/openapi.json lists what there is",
             ),
         )
 
 
 def _shown(value: Any) -> Any:
     """A value that fits into JSON and onto a screen."""
-    if isinstance(value, bool | int | type(None)) or (isinstance(value, float) and math.isfinite(value)):
+    if value is None:
+        return NOTHING
+    if isinstance(value, bool | int) or (isinstance(value, float) and math.isfinite(value)):
         return value
     return str(value)[:200]

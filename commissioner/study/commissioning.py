@@ -55,7 +55,9 @@ def require_drawable(cases: Sequence[Case], file: Path) -> None:
         except ValueError as error:
             said = str(error)
     if said:
-        raise ConfigurationError(file=str(file), key="effects, faults", value=said, expected="what the simulator knows")
+        raise ConfigurationError(
+            file=str(file), key="motors, effects or faults", value=said, expected="what the simulator knows"
+        )
 
 
 def _drawn(case: Case) -> Drawn:

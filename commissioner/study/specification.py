@@ -59,7 +59,7 @@ def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Ca
     """In order; the same file gives the same cases. ConfigurationError: an unknown motor, or no file fits."""
     if study.kind != "commission":
         return _of_files(study, path)
-    names = list(motors) if study.motors == "all" else list(study.motors)
+    names = list(motors) if study.motors == "all" else [_beside(name, path, motors) for name in study.motors]
     plates = {name: _plate(name, path, motors) for name in names}
     effects = (study.effects,) if isinstance(study.effects, str) else tuple(study.effects)
     seeds = np.random.default_rng(study.seed).integers(0, 2**31, study.runs)
@@ -70,6 +70,12 @@ def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Ca
         )
         for number, seed in enumerate(seeds)
     ]  # fmt: skip
+
+
+def _beside(name: str, path: Path, motors: Sequence[str]) -> str:
+    """As named where it is known or a file here; else the file beside the study's, if there is one."""
+    is_beside = name not in motors and not Path(name).is_file() and (path.parent / name).is_file()
+    return str(path.parent / name) if is_beside else name
 
 
 def _plate(name: str, path: Path, motors: Sequence[str]) -> Nameplate | None:

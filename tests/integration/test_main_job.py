@@ -216,6 +216,7 @@ def test_the_whole_job_runs_over_rtu(tmp_path):
 )
 def test_a_drive_that_is_not_fit_is_refused_with_its_reason_and_never_energised(scenario, code, says, tmp_path):
     with SimProcess("--scenario", scenario, "--tcp", "0") as sim:
+        seen = call("check", "--drive", sim.url, "--json")
         answer = commission(sim.url, tmp_path)
         log = sim.log()
     assert answer.code == code
@@ -223,6 +224,8 @@ def test_a_drive_that_is_not_fit_is_refused_with_its_reason_and_never_energised(
     assert says in document["reason"] + str(document["error"]["step"])
     assert document["error"]["remedy"]
     assert document["error"]["limit"] is not None
+    if scenario != "watchdog_refused":  # `check` arms none
+        assert seen.code == code and seen.json["error"]["limit"] == document["error"]["limit"]
     assert not any(row["event"] == "energised" for row in log)
     (folder,) = tmp_path.iterdir()
     assert (folder / "report.html").is_file()

@@ -50,11 +50,12 @@ def drives_new(
     probe_writes: Annotated[
         bool, typer.Option("--probe-writes", help="Also write one register's own value back, after asking.")
     ] = False,
+    json: Json = False,
 ) -> None:
     """Asks for registers and label values, proves them at the drive, and writes a drive file; the rest is [unknown] in it."""
     from commissioner.cli.verbs.drives.new import new_drive
 
-    new_drive(url, out, may_write=probe_writes)
+    new_drive(url, out, may_write=probe_writes, as_json=json)
 
 
 @drives_app.command("conformance")

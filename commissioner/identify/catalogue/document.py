@@ -17,6 +17,8 @@ WORDS = {
 def document(found: Answer) -> SheetDocument:
     """Plain JSON types. `std` of a parameter is that of a motor of this type, `std_of_type` without the tolerances."""
     return {
+        "outcome": "identified",
+        "reason": "The circuit that meets the values of a manufacturer's sheet.",
         "kind": KIND,
         "method": METHOD,
         "convention": CONVENTION,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import UsageError
-from commissioner.run.archive.catalogue import find_folder, read_run
+from commissioner.run.archive.catalogue import find_folder, must_be_archive, read_run
 from commissioner.run.archive.documents import Loss, read_result
 from commissioner.run.archive.summary import STANDINGS, RunSummary
 from commissioner.run.index.index import Found, Refreshed
@@ -71,7 +71,8 @@ def show_run(runs: Path, run: str) -> Shown:
 
 
 def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:
-    """The index in step with the folders, made where there is none; `rebuild`: from the folders alone."""
+    """The index in step with the folders, made where there is none; `rebuild`: from the folders alone. UsageError: there is no such archive."""
+    must_be_archive(archive.runs)
     return bring_into_step(archive.runs, archive.database, rebuild=rebuild)
 
 

@@ -65,7 +65,7 @@ def diagnosed(sheet: Sheet, motor: str | None, trust: str | None, out: Path | No
         "parameters_after": made["parameters"], "next_experiment": None, "model_file": None,
         "gain": {"held_out": None, "rmse_before_a": None, "rmse_after_a": None, "noise_floor_a": None,
                  "relative_error_before": None, "relative_error_after": None},
-        **{k: v for k, v in made.items() if k not in ("parameters", "kind")},
+        **{k: v for k, v in made.items() if k not in ("outcome", "reason", "parameters", "kind")},
     }  # fmt: skip
     if out is not None:
         _write(out, found, made, Path(sheet.source), told)

@@ -80,6 +80,8 @@ def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) 
     }
     parameters["rotor_time_constant_s"] = {"value": circuit.rotor_time_constant_s, "std": None}
     return {
+        "outcome": "identified",
+        "reason": "The circuit of a direct-current, a no-load and a locked-rotor test.",
         "kind": "three tests",
         "method": found.method,
         "convention": CONVENTION,

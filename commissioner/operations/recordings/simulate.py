@@ -17,7 +17,8 @@ from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.encoding import read_json
-from commissioner.errors import ConfigurationError
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.link.files.drive_file import known_drives, load_profile
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.ranges import require_range
@@ -26,17 +27,19 @@ from commissioner.operations.recordings.running import is_running_model, played
 from commissioner.paths import no_file
 from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
-from commissioner.settings import load_motor
+from commissioner.settings import load_motor, read_toml
 
 MAX_BYTES = 5_000_000
 SAMPLE_PERIOD_S = 2e-4
+MOTOR = "motor_2kw2"
+"""The motor at a drive that is played by its file: the one that comes along, which `check` takes, too."""
 Command = list[tuple[float, Any]]
 """Axis in degrees and voltage along it, a segment each."""
 
 
 @dataclass(frozen=True)
 class SimulateRequest:
-    """`model`: a model.json of a diagnosis, a manufacturer's sheet, or a motor's name or file. The command is that of the recording `like`, or six tones
+    """`model`: a model.json of a diagnosis, a manufacturer's sheet, or the name or file of a motor or of a drive with a test mode. The command is that of the recording `like`, or six tones
     at two levels on `axes_deg` for `seconds` each. `plain` leaves the named effects out."""
 
     model: str
@@ -142,9 +145,23 @@ def _motor(name: str, plain: bool) -> _Motor:
         return _extended(path, plain)
     if (sheet := sheet_of([path], None)) is not None:
         return _of_document(catalogue.model_document(catalogue.answered(sheet, None, None)))
-    plate = load_motor(name)
+    plate = load_motor(_motor_at(name))
     typical = prior(plate).typical.as_tuple()
     return _Motor(Model(typical), None, {}, plate.known())
+
+
+def _motor_at(name: str) -> str:
+    """The motor of this name or file; of a drive's file, which describes none, the one that comes along. UsageError: the drive has
+    no test mode, so there is no recording of it."""
+    is_drive = "drive" in read_toml(Path(name)) if name.endswith(".toml") else name in known_drives()
+    if not is_drive:
+        return name
+    if "excite" not in load_profile(name).capabilities:
+        raise UsageError(
+            f"{name} applies no test voltage", step="simulate", value=name, limit="a drive with the capability `excite`, or a motor",
+            remedy="give the motor's name or file",
+        )  # fmt: skip
+    return MOTOR
 
 
 def _extended(path: Path, plain: bool) -> _Motor:

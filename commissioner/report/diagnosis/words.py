@@ -122,7 +122,7 @@ def meaning(document: Document) -> list[str]:
         error = document.get("error")
         return [
             said(str(document["reason"])),
-            *([f"Seen: {_seen(error['value'])}; expected: {error['limit']}."] if error else []),
+            *([f"Seen: {_seen(error['value'])}; expected: {error['limit']}; step: {error['step']}."] if error else []),
         ]
     causes, out = ordered(document), []
     is_points = document["kind"] == "points"

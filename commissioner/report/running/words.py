@@ -89,7 +89,10 @@ def meaning(document: Document) -> list[str]:
     """What each cause means, a paragraph each."""
     if document["verdict"] == "refused":
         error = document.get("error", {})
-        return [str(document["reason"]), f"Seen: {error.get('value')}; expected: {error.get('limit')}."]
+        return [
+            str(document["reason"]),
+            f"Seen: {error.get('value')}; expected: {error.get('limit')}; step: {error.get('step')}.",
+        ]
     out = [str(document["reason"])] if document["verdict"] in ("unexplained", "not_distinguishable") else []
     return out + [f"{spoken(c['name']).capitalize()}: {CATALOGUE[c['name']].meaning}" for c in document["causes"]]
 

@@ -37,6 +37,15 @@ def run_folders(root: Path) -> list[Path]:
     return sorted((path for path in root.iterdir() if _is_run(path)), reverse=True) if root.is_dir() else []
 
 
+def must_be_archive(root: Path) -> None:
+    """UsageError where there is no folder."""
+    if not root.is_dir():
+        raise UsageError(
+            f"{root} is no folder", step="archive", value=str(root), limit="the folder of an archive",
+            remedy="give it with --runs",
+        )  # fmt: skip
+
+
 def find_folder(root: Path, name: str) -> Path:
     """As `find_run`, its folder. UsageError: none or several."""
     names = sorted(os.listdir(root), reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths

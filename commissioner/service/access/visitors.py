@@ -89,7 +89,11 @@ def check_role(who: Visitor, role: Role) -> None:
     facts: dict[str, Any] = {"step": "access", "limit": f"role {role.name.lower()}"}
     if who.role is None:
         raise Refusal(
-            401, "nobody is logged in", value=None, remedy="log in: POST /api/login, or the page /login", **facts
+            401,
+            "nobody is logged in",
+            value="no session",
+            remedy="log in: POST /api/login, or the page /login",
+            **facts,
         )
     if not who.may(role):
         remedy = "ask somebody whose account has the role"

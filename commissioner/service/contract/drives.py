@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing_extensions import TypedDict
 
+from commissioner.errors import ErrorDocument
 from commissioner.motor.nameplate import Nameplate
 from commissioner.report.run.contract import CheckRow, IdentityDocument
 from commissioner.service.library import Drive
@@ -51,7 +52,7 @@ class MotorsDocument(TypedDict):
 
 
 class ProcedureDocument(TypedDict):
-    """`procedure`: the file's tables; each value's unit is in its name, and the file says what it means."""
+    """`origin`: packaged | added. `procedure`: the file's tables; each value's unit is in its name, and the file says what it means."""
 
     id: str
     origin: str
@@ -87,11 +88,12 @@ class RunLimitsDocument(TypedDict):
 
 
 class CheckDocument(TypedDict):
-    """`check`. `outcome`: passed | rejected. `limits`: null of a drive that cannot energise for us. `nameplate_in_drive` and
+    """`check`. `outcome`: passed | rejected. `error`: the first check that says no. `limits`: null of a drive that cannot energise for us. `nameplate_in_drive` and
     `parameters_in_drive` by the drive file's names and in its units."""
 
     outcome: str
     reason: str
+    error: ErrorDocument | None
     drive: IdentityDocument
     nameplate_in_drive: dict[str, float | None]
     parameters_in_drive: dict[str, float | None]

@@ -65,6 +65,7 @@ class AuditEntry(_From):
     drive: NotRequired[str]
     motor: NotRequired[str]
     scenario: NotRequired[str]
+    procedure: NotRequired[str]
     run: NotRequired[str]
     reason: NotRequired[str]
     by: NotRequired[str]

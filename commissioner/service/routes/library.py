@@ -17,14 +17,15 @@ from commissioner.service.contract.drives import (
     DriveStateDocument,
     MotorDocument,
     MotorsDocument,
+    ProcedureDocument,
     ProceduresDocument,
 )
 from commissioner.service.contract.plates import JudgedPlate
-from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge_plate, must_be_there
+from commissioner.service.library import SIMULATOR, Drive, Library, Motor, Procedure, judge_plate, must_be_there
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.watch import describe
 from commissioner.service.simulator import SCENARIOS
-from commissioner.settings import CONFIG_FOLDER, MotorFile, read_toml
+from commissioner.settings import MotorFile, ProcedureFile, read_toml
 
 router = APIRouter(route_class=Typed)
 
@@ -34,6 +35,14 @@ class NewMotor(MotorFile):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     id: Identifier
+
+
+class NewProcedure(BaseModel):
+    """A procedure, as its file says it, with the id under which it is kept."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    id: Identifier
+    procedure: ProcedureFile
 
 
 class SimulatorWish(BaseModel):
@@ -91,10 +100,22 @@ async def put_motor(request: Request, motor: NewMotor, _who: Operator) -> MotorD
 
 
 @router.get("/api/procedures")
-async def procedures(_who: Viewer) -> ProceduresDocument:
-    """The procedure that ships with the product, as its file says."""
-    procedure = read_toml(CONFIG_FOLDER / "procedure.toml")
-    return {"procedures": [{"id": "standard", "origin": "packaged", "procedure": procedure}]}
+async def procedures(request: Request, _who: Viewer) -> ProceduresDocument:
+    """The procedure that ships with the product, then added ones, as their files say."""
+    return {"procedures": [_procedure(one) for one in parts_of(request).library.procedures()]}
+
+
+def _procedure(one: Procedure) -> ProcedureDocument:
+    return {"id": one.id, "origin": one.origin, "procedure": read_toml(one.path)}
+
+
+@router.post("/api/procedures", status_code=201)
+async def put_procedure(request: Request, new: NewProcedure, who: Operator) -> ProcedureDocument:
+    """Check and keep a procedure; POST /api/runs takes its id."""
+    parts = parts_of(request)
+    kept = parts.library.put_procedure(new.id, new.procedure)
+    await parts.note(who, "added a procedure", procedure=kept.id)
+    return _procedure(kept)
 
 
 @router.post("/api/nameplates/validate")

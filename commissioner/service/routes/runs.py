@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.runs import Begun, RunAnswer, RunRow, RunsDocument
-from commissioner.service.library import Drive, Motor, must_be_there
+from commissioner.service.library import STANDARD, Drive, Motor, must_be_there
 from commissioner.service.parts import Parts
 from commissioner.service.runs.child import ask_for, succeed
 from commissioner.service.runs.desk import LiveRun
@@ -23,6 +23,8 @@ from commissioner.service.runs.live import live_document
 
 router = APIRouter(route_class=Typed)
 Angle = Annotated[float, Field(ge=-360, le=360)]
+Given = BeforeValidator(lambda value: value or 100)
+"""A filter that a form left empty is none."""
 
 
 class RunWish(BaseModel):
@@ -33,6 +35,7 @@ class RunWish(BaseModel):
     motor: Annotated[str, Field(max_length=60)]
     axes_deg: Annotated[list[Angle], Field(max_length=12)] = []
     write_back: bool = False
+    procedure: Annotated[str, Field(max_length=60)] = STANDARD
     confirm: Literal[True]
 
 
@@ -46,7 +49,8 @@ async def start(request: Request, wish: RunWish, who: Operator) -> Begun:
 async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
     """The run, begun. The audit says so before anything moves."""
     drive, motor = parts.library.drive(wish.drive), parts.library.motor(wish.motor)
-    verb = parts.desk.commissioning(wish.axes_deg, write_back=wish.write_back)
+    procedure = parts.library.procedure(wish.procedure)
+    verb = parts.desk.commissioning(wish.axes_deg, write_back=wish.write_back, procedure=procedure)
     return await begin(parts, drive, motor, verb, who, write_back=wish.write_back)
 
 
@@ -68,7 +72,7 @@ async def runs(
     drive: Annotated[str, Query(max_length=80)] = "",
     outcome: Annotated[str, Query(max_length=40)] = "",
     since: Annotated[str, Query(max_length=32, pattern=r"^[0-9TZ:.+\-]*$")] = "",
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    limit: Annotated[int, Query(ge=1, le=1000), Given] = 100,
 ) -> RunsDocument:
     """The archive, newest first."""
     parts = parts_of(request)

@@ -16,7 +16,7 @@ from commissioner.run.stopping.stop_file import ask_to_stop
 from commissioner.service.audit import Audit
 from commissioner.service.configuration import Settings
 from commissioner.service.contract.runs import Stopped
-from commissioner.service.library import Drive, Library, Motor
+from commissioner.service.library import STANDARD, Drive, Library, Motor, Procedure
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import Child
 from commissioner.service.runs.control import Control, Pages, Party
@@ -135,11 +135,12 @@ class Desk:
             raise Refusal(409, f"{drive.name} is in use: {person}", step="start a run", value=holder.id if holder else "starting",
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
-    def commissioning(self, axes_deg: Sequence[float], *, write_back: bool) -> list[str]:
+    def commissioning(self, axes_deg: Sequence[float], *, write_back: bool, procedure: Procedure) -> list[str]:
         """The verb of an ordinary run."""
         chosen = axes_deg or self.settings.file.service.axes_deg
         axes = ["--axes", ",".join(f"{axis:g}" for axis in chosen)] if chosen else []
         more = ["--write-back"] if write_back else []
+        more += ["--procedure", str(procedure.path)] if procedure.id != STANDARD else []
         return ["run", *axes, *more, *([] if self.settings.file.service.diagnosis else ["--no-diagnosis"])]
 
     def _arguments(self, drive: Drive, motor: Motor, verb: Sequence[str]) -> list[str]:

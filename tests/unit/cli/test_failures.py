@@ -16,7 +16,8 @@ from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
 from commissioner.cli.screens import screen
 from commissioner.cli.signals import let_end
-from commissioner.errors import ConfigurationError, DriveFault
+from commissioner.errors import ConfigurationError, DataRefused, DriveFault
+from commissioner.link.files.drive_file import DRIVES_FOLDER
 from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND, call
 
@@ -310,3 +311,23 @@ def test_a_call_that_cannot_be_read_names_step_value_limit_and_remedy(capsys):
         "step command line value runs list --nope limit commissioner runs list [OPTIONS] remedy `commissioner runs list --help`"
         in said
     )
+
+
+def test_what_was_not_there_has_a_value_too(capsys):
+    nothing = DataRefused("the metadata lack pole_pairs", step="plate", value=None, limit="a number", remedy="add it")
+    _, document = leave(capsys, of=raising(nothing))
+    assert document["error"]["value"] == "nothing"
+
+
+@pytest.mark.parametrize("verb", [("runs", "index"), ("runs", "index", "--rebuild"), ("runs", "verify", "--all")])
+def test_a_folder_that_is_not_there_is_a_wrong_call(verb, capsys, tmp_path):
+    code, document = leave(capsys, *verb, "--runs", tmp_path / "none")
+    assert (code, document["outcome"]) == (2, "usage") and "no folder" in document["reason"]
+
+
+def test_a_drive_with_a_test_mode_can_be_played_another_cannot(capsys, tmp_path):
+    played = [leave(capsys, "simulate", drive, "--seconds", "0.2", "--out", tmp_path / "x.csv") for drive in
+              ("simulated", DRIVES_FOLDER / "simulated.toml", "motor_2kw2")]  # fmt: skip
+    assert [code for code, _ in played] == [0, 0, 0] and len({done["samples"] for _, done in played}) == 1
+    code, refused = leave(capsys, "simulate", "danfoss_fc302", "--out", tmp_path / "y.csv")
+    assert (code, refused["error"]["limit"]) == (2, "a drive with the capability `excite`, or a motor")

@@ -42,3 +42,15 @@ def test_only_the_verb_that_is_called_for_is_read(verb, capsys):
 @pytest.mark.parametrize("arguments", [(), ("--help",), ("--version", "run"), ("ran",)])
 def test_all_are_read_where_no_verb_is_named_first(arguments):
     assert only(app, arguments) is app
+
+
+def leaves(group, *path):
+    for command in group.registered_commands:
+        yield (*path, command.name or command.callback.__name__)
+    for inner in group.registered_groups:
+        yield from leaves(inner.typer_instance, *path, inner.name)
+
+
+@pytest.mark.parametrize("verb", list(leaves(app)), ids=" ".join)
+def test_every_verb_takes_json(verb, capsys):
+    assert " --json " in said(capsys, *verb, "--help")

@@ -175,6 +175,7 @@ def test_it_is_a_source_of_a_model_for_every_verb(tmp_path):
     path.write_text(GERMAN, encoding="utf-8")
     done = identify_any(IdentifyRequest((path,), out=out))
     assert isinstance(done, IdentifiedCatalogue) and done.document["kind"] == "manufacturer's sheet"
+    assert done.document["outcome"] == "identified" and "sheet" in done.document["reason"]
     assert {"report.html", "identification.json", "model.json", "motor.toml", "motor.mo", "motor.py", "motor.mat", "motor.csv", "motor.json"} == {
         p.name for p in out.iterdir()
     }  # fmt: skip

@@ -34,6 +34,7 @@ def test_a_sheet_gives_its_circuit_under_anybodys_headers(tmp_path: Path, name: 
     path.write_text(SHEETS[name], encoding="utf-8")
     done = identify_any(IdentifyRequest((path,)))
     assert isinstance(done, IdentifiedSheets)
+    assert done.document["outcome"] == "identified" and "no-load" in done.document["reason"]
     found = [q["value"] for q in done.document["parameters"].values()]
     assert found[:4] == pytest.approx([0.2429, 0.1514, 3.484e-3, 35.11e-3], rel=1e-3)
     assert all(q["std"] is None for q in done.document["parameters"].values())

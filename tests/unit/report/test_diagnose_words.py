@@ -253,7 +253,7 @@ def test_a_refusal_and_a_null_are_said_plainly():
     data = refused_document(refused("sensor_offset too large", 3.0, "at most 2", "turn it off"), "recording")
     assert "cannot carry" in headline(data) and meaning(data) == [
         "sensor offset too large; turn it off",
-        "Seen: 3.00; expected: at most 2.",
+        "Seen: 3.00; expected: at most 2; step: diagnose.",
     ]
     assert data["error"] == {
         "kind": "DataRefused",

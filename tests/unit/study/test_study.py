@@ -363,3 +363,11 @@ def test_a_motor_file_is_a_motor_by_its_plate_and_a_scenario_file_is_moved(tmp_p
         assert drawn.document["sensors"]["noise_a"] == 0.05
         truth, moved = (one.parameters_at(0.5)["leakage_inductance_h"] for one in (drawn, other))
         assert 0.0 < abs(moved / truth - 1.0) < 0.25
+
+
+def test_a_motor_file_beside_the_study_is_found_from_anywhere(tmp_path):
+    (tmp_path / "mein Prüfling.toml").write_text("", "utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text('kind = "commission"\nruns = 1\nmotors = ["mein Prüfling.toml"]\n', "utf-8")
+    (case,) = cases_of(load(path, Specification), path, MOTORS)
+    assert case.motor == str(tmp_path / "mein Prüfling.toml")

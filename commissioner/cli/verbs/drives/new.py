@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from commissioner.cli.screens import screen
+from commissioner.cli.verbs.drives.files import show_drive
 from commissioner.errors import CheckFailed, UsageError
 from commissioner.link.drive.ordinary import probing
 from commissioner.link.drive.ordinary.probing import Known, Reading
@@ -51,8 +52,8 @@ class Probed:
     longest_s: float
 
 
-def new_drive(url: str, out: Path, *, may_write: bool) -> None:
-    """Writes `out`. UsageError: it is there already. CheckFailed: the values on the label are not in the registers named."""
+def new_drive(url: str, out: Path, *, may_write: bool, as_json: bool) -> None:
+    """Writes `out`; asks on stderr. UsageError: it is there already. CheckFailed: the values on the label are not in the registers named."""
     if out.exists():
         raise UsageError(
             "the file is there already",
@@ -62,12 +63,15 @@ def new_drive(url: str, out: Path, *, may_write: bool) -> None:
             remedy="give another --out",
         )
     address = parse_url(url)
-    name = typer.prompt("Name of the drive").strip()
-    source = typer.prompt("Document or manual with its register table").strip()
+    name = typer.prompt("Name of the drive", err=True).strip()
+    source = typer.prompt("Document or manual with its register table", err=True).strip()
     known = _labels(source)
     with closing(open_port(address, _bare(name))) as port:
         probed = _probe(port, known, may_write=may_write)
     out.write_text(text_of(name, source, probed), encoding="utf-8", newline="\n")
+    if as_json:
+        show_drive(str(out), as_json=True)
+        return
     profile = load_profile(str(out))
     screen.out.print(
         f"[green]{screen.text(str(out))}[/]: {len(profile.items)} items, read and proved; the rest is [unknown] in it"
@@ -77,11 +81,13 @@ def new_drive(url: str, out: Path, *, may_write: bool) -> None:
 def _labels(source: str) -> list[Known]:
     known = []
     for name, (unit, words) in ASKED.items():
-        if not typer.confirm(f"Is the register of the {words} in the manual?"):
+        if not typer.confirm(f"Is the register of the {words} in the manual?", err=True):
             continue
-        printed = typer.prompt("  its register as printed (decimal, or 0x...)", value_proc=lambda text: int(text, 0))
-        value = typer.prompt(f"  its value in {unit}", type=float)
-        page = typer.prompt("  page").strip()
+        printed = typer.prompt(
+            "  its register as printed (decimal, or 0x...)", value_proc=lambda text: int(text, 0), err=True
+        )
+        value = typer.prompt(f"  its value in {unit}", type=float, err=True)
+        page = typer.prompt("  page", err=True).strip()
         known.append(Known(name, printed, value, unit, f"{source}, {page}"))
     if len(known) < FEWEST:
         raise UsageError(
@@ -111,7 +117,7 @@ def _probe(port: ModbusPort, known: list[Known], *, may_write: bool) -> Probed:
     first = next(iter(chosen.values()))[1].item
     functions: tuple[int, ...] = ()
     if may_write and typer.confirm(
-        f"Write the value of register {first.address} back into it, to see which functions it takes?"
+        f"Write the value of register {first.address} back into it, to see which functions it takes?", err=True
     ):
         functions = probing.write_functions(port, first.address)
     return Probed(chosen, probing.blocks(port, first.address), functions, *probing.answer_times(port, first.address))
