@@ -113,7 +113,7 @@ def test_a_table_that_is_refused_has_a_page_and_the_remedy(tmp_path):
         and answer.json["error"]["remedy"]
     )
     assert "cannot carry an answer" in (tmp_path / "out" / "report_few.html").read_text()
-    assert "expected: at least 5." in " ".join(call("diagnose", str(rows[0])).stdout.split())
+    assert "expected: at least 5; step: diagnose." in " ".join(call("diagnose", str(rows[0])).stdout.split())
 
 
 def test_a_cell_that_is_no_number_and_a_column_that_lacks_are_named(tmp_path):
