@@ -1,4 +1,4 @@
-"""Where runs are kept unless it is told, and what is said of a path that leads to no file."""
+"""Where runs are kept and which motor is meant unless it is told, and what is said of a path that leads to no file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from commissioner.errors import UsageError
 
 RUNS = Path("runs")
 """The archive, in the folder that the command line is in."""
+MOTOR = "motor_2kw2"
+"""The one that comes along, at the drive that comes along."""
 
 
 def no_file(path: Path, step: str, limit: str = "an existing file") -> UsageError:

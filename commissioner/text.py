@@ -29,9 +29,11 @@ def shown(value: object, longest: int = LONGEST) -> str:
 
 
 def split_address(text: str) -> SplitResult:
-    """The parts of an address that somebody gave; none where it is no address."""
+    """The parts of an address that somebody gave; none where it is no address, or its port none."""
     try:
-        return urlsplit(text)
+        parts = urlsplit(text)
+        _ = parts.port  # raises where it is no number of a port
+        return parts
     except ValueError:
         return urlsplit("")
 

@@ -31,7 +31,7 @@ from commissioner.cli.options import (
     Trust,
     Waits,
 )
-from commissioner.paths import RUNS
+from commissioner.paths import MOTOR, RUNS
 
 app = typer.Typer(
     name="commissioner",
@@ -99,7 +99,7 @@ def demo(
 def check(
     drive: Drive,
     profile: Profile = "simulated",
-    motor: Motor = "motor_2kw2",
+    motor: Motor = MOTOR,
     procedure: Procedure = None,
     axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     json: Json = False,

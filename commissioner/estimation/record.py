@@ -139,12 +139,14 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             remarks.append(
                 f"{one.source}: the supply turns backwards (u, w, v): phases v and w are taken for one another."
             )
-        is_against = one.speed_rad_per_s is not None and _turns_against(one.speed_rad_per_s, voltage)
-        if is_against and not is_backwards:
-            remarks.append(
-                f"{one.source}: shaft and supply turn against each other: the speed's sign is taken for wrong."
-            )
-        windows += _windows(_reversed(one) if is_against else one, current, voltage, plate, has_speed, scales)
+        signed, speed = one, one.speed_rad_per_s
+        if speed is not None and _turns_against(speed, voltage):
+            signed = replace(one, speed_rad_per_s=-speed)
+            if not is_backwards:
+                remarks.append(
+                    f"{one.source}: shaft and supply turn against each other: the speed's sign is taken for wrong."
+                )
+        windows += _windows(signed, current, voltage, plate, has_speed, scales)
     if not windows:
         raise _refused(
             "no stretch with voltage is long enough",
@@ -267,11 +269,6 @@ def _is_crossed(current: Array, voltage: Array) -> bool:
 def _near(mask: Bools, by: int) -> Bools:
     """Whether anything within `by` samples is in the mask."""
     return np.asarray(maximum_filter1d(mask, 2 * by + 1, mode="constant"))
-
-
-def _reversed(one: RunningRecording) -> RunningRecording:
-    """With the speed's other sign."""
-    return replace(one, speed_rad_per_s=None if one.speed_rad_per_s is None else -one.speed_rad_per_s)
 
 
 def _jumps(voltage: Array, scales: Scales) -> Bools:

@@ -30,3 +30,4 @@ FIVE = (
 )
 FOUR = FIVE[:4]
 """What standstill data fix; the fifth follows."""
+FIELDS = tuple(q.field for q in FIVE)

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from jinja2 import Environment
 from markupsafe import Markup, escape
 
-from commissioner.motor.quantities import FIVE
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -45,10 +43,6 @@ PLOT_STYLE: dict[Any, Any] = {
     "svg.hashsalt": "commissioner",
     "figure.constrained_layout.use": True,
 }
-
-
-MACHINE = tuple((q.field, q.name, q.factor, q.unit) for q in FIVE)
-"""What a motor is known by: key, name, factor and unit in which it is shown."""
 
 
 @dataclass(frozen=True)

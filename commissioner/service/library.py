@@ -113,8 +113,7 @@ class Library:
                 limit=problem.expected, remedy="read the plate again",
             )  # fmt: skip
         _must_be_new([m.id for m in self.motors() if m.origin == "packaged"], identifier)
-        rows = [f"{key} = {json.dumps(value)}" for key, value in table.model_dump().items() if value is not None]
-        _write(self._data / "motors" / f"{identifier}.toml", "\n".join(rows) + "\n")
+        _write(self._data / "motors" / f"{identifier}.toml", _toml(table.model_dump()))
         return self.motor(identifier)
 
     def procedures(self) -> list[Procedure]:
@@ -129,10 +128,8 @@ class Library:
         """Keep a procedure, new or changed. UsageError: its values contradict each other, or the id is the packaged one's."""
         must_agree(table, f"procedure {identifier}")
         _must_be_new([STANDARD], identifier)
-        rows = []
-        for name, values in table.model_dump().items():
-            rows += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in values.items()), ""]
-        _write(self._data / "procedures" / f"{identifier}.toml", "\n".join(rows))
+        tables = (f"[{name}]\n{_toml(values)}" for name, values in table.model_dump().items())
+        _write(self._data / "procedures" / f"{identifier}.toml", "\n".join(tables))
         return self.procedure(identifier)
 
     def profiles(self) -> list[str]:
@@ -249,6 +246,11 @@ def _read_json(path: Path) -> JsonObject | None:
         return DriveTable.model_validate(read_json(path.read_text("utf-8"))).model_dump()
     except ValueError:
         return None
+
+
+def _toml(values: Mapping[str, object]) -> str:
+    """A line for each value that is said."""
+    return "".join(f"{key} = {json.dumps(value)}\n" for key, value in values.items() if value is not None)
 
 
 def _write(path: Path, text: str) -> None:

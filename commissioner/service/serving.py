@@ -69,13 +69,13 @@ def _alone_in(folder: Path) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     lock = FileLock(folder / "service.lock")
     try:
-        lock.acquire(timeout=0)
+        held = lock.acquire(timeout=0)
     except Timeout:
         raise UsageError(
             f"another service works in {folder}", step="serve", value=str(folder), limit="one service for one folder",
             remedy="use that one's page, or give this one another folder: --runs, or `data` in the file of --config",
         ) from None  # fmt: skip
-    with lock:
+    with held:
         yield
 
 

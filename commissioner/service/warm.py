@@ -48,10 +48,11 @@ def main() -> None:
 
     if hasattr(os, "nice"):
         os.nice(10)
+    from commissioner.paths import MOTOR
     from commissioner.procedure.energised.excite import warm_up
     from commissioner.settings import load_motor
 
-    warm_up(load_motor("motor_2kw2"))
+    warm_up(load_motor(MOTOR))
 
 
 if __name__ == "__main__":

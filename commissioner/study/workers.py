@@ -11,11 +11,11 @@ from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.study.rows import DEFECT, Row
 from commissioner.study.specification import Case
+from commissioner.text import split_address
 
 AHEAD = 4
 """Cases handed out for each worker: memory stays what it is however many there are."""
@@ -103,11 +103,8 @@ def _pool(cases: Sequence[Case], workers: int) -> Iterator[Row]:
 
 
 def _is_address(scheduler: str) -> bool:
-    try:
-        parts = urlsplit(scheduler)
-        return parts.scheme in ("tcp", "tls") and bool(parts.hostname) and bool(parts.port)
-    except ValueError:
-        return False
+    parts = split_address(scheduler)
+    return parts.scheme in ("tcp", "tls") and bool(parts.hostname) and bool(parts.port)
 
 
 def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:

@@ -8,6 +8,7 @@ from commissioner.cli.angles import parse_axes
 from commissioner.cli.verbs.run import run
 from commissioner.operations.closing import DIAGNOSIS_S
 from commissioner.operations.commission import CommissionRequest
+from commissioner.paths import MOTOR
 from commissioner.study.own_process import simulated_inverter
 
 
@@ -35,7 +36,7 @@ def demo(
 
     with simulated_inverter(scenario, speed, seed, wait=wait) as url:
         request = CommissionRequest(
-            url, "simulated", "motor_2kw2", runs, None, parse_axes(axes), write_back,
+            url, "simulated", MOTOR, runs, None, parse_axes(axes), write_back,
             DIAGNOSIS_S if diagnosis else 0.0, waits=True, strict=strict,
         )  # fmt: skip
         run(request, yes=True, as_json=as_json)

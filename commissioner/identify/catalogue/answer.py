@@ -15,8 +15,8 @@ from commissioner.identify.catalogue.fit import Fit, fit
 from commissioner.identify.catalogue.machine import Array, at, breakdown, cages, inverse_gamma, loaded, performance
 from commissioner.identify.catalogue.sheet import KEYS, Sheet, pole_pairs, synchronous_rpm
 from commissioner.identify.contract import Silence
-from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.quantities import FIELDS
 
 SILENT = 0.75
 """Of an assumption's spread: an error above it is the assumption's, the sheet did not tell the value."""
@@ -147,7 +147,7 @@ def _parameters(found: Fit) -> dict[str, Stated]:
         four = inverse_gamma(x, _rated_slip(found.evidence, x)) * units
         return np.concatenate([four, four[:, 3:] / four[:, 1:2]], axis=1)
 
-    return _named(found, of, (*PARAMETERS, "rotor_time_constant_s"))
+    return _named(found, of, FIELDS)
 
 
 def _without(every: Mapping[str, Stated], withheld: Mapping[str, str]) -> dict[str, Stated]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from commissioner.errors import UsageError
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS
-from commissioner.motor.circuit import PARAMETERS
+from commissioner.motor.quantities import FIELDS
 from commissioner.recordings.whole import whole_file
 from commissioner.text import visible
 
@@ -17,7 +17,6 @@ TEXTS = (
     "run", "started_utc", "ended_utc", "outcome", "standing", "reason", "written", "drive", "url", "profile", "person", "host",
     "version", "motor_tag", "motor_serial", "motor_name", "folder",
 )  # fmt: skip
-QUANTITIES = (*PARAMETERS, "rotor_time_constant_s")
 ENDINGS = (".csv", ".parquet")
 
 
@@ -41,7 +40,7 @@ def _row(summary: Mapping[str, Any]) -> dict[str, str | float | None]:
     row["energised_s"] = _number(summary.get("energised_s"))
     plate, found = summary.get("motor") or {}, summary.get("parameters") or {}
     row |= {name: _number(plate.get(name)) for name in NAMEPLATE_KEYS}
-    for name in QUANTITIES:
+    for name in FIELDS:
         quantity = found.get(name) or {}
         row |= {name: _number(quantity.get("value")), f"{name}_std": _number(quantity.get("std"))}
     row["at_stator_flux_wb"] = _number((found.get("magnetizing_inductance_h") or {}).get("at_stator_flux_wb"))

@@ -24,15 +24,13 @@ from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.ranges import require_range
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.running import is_running_model, played
-from commissioner.paths import no_file
+from commissioner.paths import MOTOR, no_file
 from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
 from commissioner.settings import load_motor, read_toml
 
 MAX_BYTES = 5_000_000
 SAMPLE_PERIOD_S = 2e-4
-MOTOR = "motor_2kw2"
-"""The motor at a drive that is played by its file: the one that comes along, which `check` takes, too."""
 Command = list[tuple[float, Any]]
 """Axis in degrees and voltage along it, a segment each."""
 

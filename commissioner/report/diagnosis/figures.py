@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.verdict.collinearity import Alike
 from commissioner.diagnose.verdict.residuals import Correlation, Residuals, Spectrum
+from commissioner.motor.circuit import QUANTILE
 from commissioner.report.diagnosis.names import spoken
 from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 BEFORE, AFTER = "simulation as it was", "with the named causes"
 TOTAL_WIDTH = 9.4
-BAND, NOISE_BAND = 2.58, 1.96
+BAND, NOISE_BAND = 2.58, QUANTILE
 """99 % and 95 % of a normal variable."""
 VISIBLE = 0.02
 """Thinnest band that shows, as a share of a panel's height."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE
+from commissioner.motor.quantities import FIVE, Quantity
 from commissioner.report.diagnosis.names import Cause, class_name, plain_of, size_words, spoken, sure_words
 from commissioner.report.diagnosis.numbers import PLUS_MINUS, chance, limit_words, number, part_word, percent
 from commissioner.report.diagnosis.words import (
@@ -21,16 +22,16 @@ from commissioner.report.diagnosis.words import (
     tone,
 )
 from commissioner.report.folded import hinted
-from commissioner.report.page import MACHINE, Section, Table, Tone
+from commissioner.report.page import Section, Table, Tone
 from commissioner.report.sheet.marks import coded
 
 SURE = 0.8
 """Names below this probability are marked."""
 NAMES = (
-    *MACHINE,
-    ("stator_inductance_h", "stator inductance L_s", 1e3, "mH"),
-    ("total_resistance_ohm", "total resistance", 1.0, "Ω"),
-    ("loss_at_highest_voltage_w", "loss at the highest voltage", 1.0, "W"),
+    *FIVE,
+    Quantity("stator_inductance_h", "stator inductance", "L_s", 1e3, "mH"),
+    Quantity("total_resistance_ohm", "total resistance", "", 1.0, "Ω"),
+    Quantity("loss_at_highest_voltage_w", "loss at the highest voltage", "", 1.0, "W"),
 )
 
 
@@ -159,15 +160,15 @@ def not_found(document: Document) -> Section:
 def parameters(document: Document) -> Section:
     """The four values without and with the causes: how far off, never what to enter."""
     rows = []
-    for key, title, scale, unit in NAMES:
-        before, after = document["parameters_before"].get(key), document["parameters_after"].get(key)
+    for q in NAMES:
+        before, after = document["parameters_before"].get(q.field), document["parameters_after"].get(q.field)
         if before and after:
             change = before["value"] / after["value"] - 1.0
             rows.append(
                 (
-                    title,
-                    _plain(before, scale, unit),
-                    _plain(after, scale, unit),
+                    q.name,
+                    _plain(before, q.factor, q.unit),
+                    _plain(after, q.factor, q.unit),
                     f"{'+' if change > 0.0 else ''}{number(100.0 * change, 3)} %",
                 )
             )
@@ -183,7 +184,7 @@ def parameters(document: Document) -> Section:
 def circuit(document: Document) -> Section:
     """The circuit of three tests, which nothing is left over to judge."""
     after = document["parameters_after"]
-    rows = [(title, _plain(after[key], scale, unit)) for key, title, scale, unit in NAMES if key in after]
+    rows = [(q.name, _plain(after[q.field], q.factor, q.unit)) for q in NAMES if q.field in after]
     return Section("The circuit", Table(("inverse-Gamma, per star phase", "value"), rows))
 
 

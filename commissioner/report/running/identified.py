@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
 def page_of(seen: Identified, document: Document, name: str) -> Page:
     """One self-contained page."""
-    rows = [
-        _row(label, document["parameters"].get(key) or document.get(key), factor, unit)
-        for key, label, factor, unit in NAMES
-    ]
+    rows = [_row(q.name, document["parameters"].get(q.field) or document.get(q.field), q.factor, q.unit) for q in NAMES]
     facts = [
         ("left by the model, of the noise", number(document["residual_over_noise"])),
         ("peak stator flux it holds at", f"{number(document['holds_for_stator_flux_wb'])} Wb"),

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from commissioner.motor.circuit import QUANTILE
-from commissioner.report.page import MACHINE, Page, Section, Table, Tone, picture
+from commissioner.motor.quantities import FIVE, Quantity
+from commissioner.report.page import Page, Section, Table, Tone, picture
 from commissioner.report.running import figures
 from commissioner.report.running.words import (
     Document,
@@ -23,8 +24,8 @@ from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 
 NAMES = (
-    *MACHINE,
-    ("inertia_kg_m2", "inertia", 1.0, "kg m²"),
+    *FIVE,
+    Quantity("inertia_kg_m2", "inertia", "", 1.0, "kg m²"),
 )
 
 
@@ -145,14 +146,14 @@ def _not_found(document: Document) -> Section:
 
 def _parameters(document: Document) -> Section:
     rows = []
-    for key, title, scale, unit in NAMES:
-        before, after = document["parameters_before"].get(key), document["parameters_after"].get(key)
+    for q in NAMES:
+        before, after = document["parameters_before"].get(q.field), document["parameters_after"].get(q.field)
         if before and after:
             values = [
-                f"{number(x['value'] * scale, 4)} ± {number(QUANTILE * x['std'] * scale, 2)} {unit}"
+                f"{number(x['value'] * q.factor, 4)} ± {number(QUANTILE * x['std'] * q.factor, 2)} {q.unit}"
                 for x in (before, after)
             ]
-            rows.append((title, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))
+            rows.append((q.name, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))
     return Section(
         "The machine's numbers", Table(("", "plain simulation", "with the causes", "plain one was off by"), rows)
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
+from commissioner.motor.circuit import QUANTILE
 from commissioner.report.sheet.marks import capitalised
 from commissioner.service.page.texts import NBSP, Texts, typeset
 
@@ -137,7 +138,7 @@ class Words:
         value, std, unit = float(size["value"]), float(size.get("std") or 0.0), str(size.get("unit") or "")
         if std <= 0.0:
             return self._t.short(value, unit)
-        return self._t.with_error(value, 1.96 * std, unit)
+        return self._t.with_error(value, QUANTILE * std, unit)
 
     def _unit(self, check: Mapping[str, Any]) -> tuple[str, int]:
         return UNITS.get(_plain(str(check["name"])), ("", 1))

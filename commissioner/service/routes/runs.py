@@ -23,7 +23,8 @@ from commissioner.service.runs.live import live_document
 
 router = APIRouter(route_class=Typed)
 Angle = Annotated[float, Field(ge=-360, le=360)]
-Given = BeforeValidator(lambda value: value or 100)
+USUAL = 100
+Given = BeforeValidator(lambda value: value or USUAL)
 """A filter that a form left empty is none."""
 
 
@@ -72,7 +73,7 @@ async def runs(
     drive: Annotated[str, Query(max_length=80)] = "",
     outcome: Annotated[str, Query(max_length=40)] = "",
     since: Annotated[str, Query(max_length=32, pattern=r"^[0-9TZ:.+\-]*$")] = "",
-    limit: Annotated[int, Query(ge=1, le=1000), Given] = 100,
+    limit: Annotated[int, Query(ge=1, le=1000), Given] = USUAL,
 ) -> RunsDocument:
     """The archive, newest first."""
     parts = parts_of(request)

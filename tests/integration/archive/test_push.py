@@ -181,7 +181,14 @@ def test_no_file_name_leads_out_of_its_folder(service, run, name):
 
 
 def test_no_password_goes_over_an_open_line_and_no_other_address_is_taken(run):
-    for url in ("http://192.168.0.9:8321", "ftp://host", "http://", "http://otto:secret@127.0.0.1:1"):
+    for url in (
+        "http://192.168.0.9:8321",
+        "ftp://host",
+        "http://",
+        "http://host:port",
+        "http://host:99999",
+        "http://otto:secret@127.0.0.1:1",
+    ):
         with pytest.raises(UsageError) as error:
             send(run.parent, url, account=OTTO)
         assert "secret" not in str(vars(error.value))
