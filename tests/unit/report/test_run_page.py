@@ -217,6 +217,45 @@ def test_one_value_is_one_value_and_a_guard_that_acted_is_not_hidden():
     assert "the flux guard took the amplitude back" in text
 
 
+def test_a_long_tag_never_runs_over_its_neighbours_in_the_margin():
+    tag = "Kühlwasserpumpe Halle 12 Süd, Reserveaggregat mit langer Bezeichnung"
+    first, page = first_page(result(), request={"origin": {"motor_tag": tag}})
+    margin = re.search(r'@top-left { content: "([^"]*)" }', page).group(1)
+    assert len(margin) <= 54
+    assert margin.endswith("…")
+    assert tag in words(first)
+
+
+def test_a_change_a_year_has_the_places_of_its_interval():
+    page = run_page(result(), JOURNAL, Findings(), years=history(40))
+    changes = re.findall(r'data-l="Change a year">([^<>]*) ± ([^<>]*) %<', page)
+    assert len(changes) == 4
+    for value, half in changes:
+        assert len(value.partition(".")[2]) == len(half.partition(".")[2]), (value, half)
+
+
+TUNED = {
+    "name": "motor_r1", "unit": "mohm", "before": 3200.0, "values": [3716.0, 3720.0], "median": 3718.0, "spread_percent": 0.11,
+    "trend_percent": 0.1, "change_percent": 16.2, "field": "stator_resistance_ohm", "ours": 3.718, "conversion": "per phase",
+    "plate_low": 0.5, "plate_high": 12.0, "earlier": [],
+}  # fmt: skip
+
+
+def test_a_tuned_result_has_its_unit_in_every_column():
+    tune = {"in_the_drive": "the best repeat", "repeats": [{}], "form": "standstill", "rows": [TUNED]}
+    error = {
+        "what": "stopped",
+        "step": "tune",
+        "value": 15.200000762939453,
+        "limit": 14.0,
+        "unit": "A",
+        "remedy": "look",
+    }
+    text = words(run_page(result("faulted", written=False, tune=tune, error=error), JOURNAL, Findings()))
+    for told in ("3200.0 mohm", "3716.0, 3720.0 mohm", "3.718 Ω (per phase)", "0.5 ... 12 Ω", "15.2 A", "one time"):
+        assert told in text, told
+
+
 def test_a_fault_after_writing_says_how_to_get_the_old_values_back():
     text = words(first_page(result("faulted", error={"what": "x", "remedy": "look"}))[0])
     assert "nothing written" not in text
