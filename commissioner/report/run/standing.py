@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.report.sheet.numbers import half_width, with_interval
-
 ACCEPTED, RESTORED_SINCE = "accepted, not written", "commissioned, restored since"
 """How a run stands that ended as commissioned while the drive does not hold its values."""
 
@@ -19,6 +17,8 @@ def standing(result: Mapping[str, Any]) -> str:
 
 def finding_sentences(result: Mapping[str, Any]) -> list[str]:
     """What the axes' comparison saw, each with its size and 95 % interval."""
+    from commissioner.report.sheet.numbers import half_width, with_interval  # with numpy behind it
+
     return [
         f"{f['sentence']}, by {with_interval(100 * abs(f['relative_size']), half_width(f['relative_std'], 100))} %"
         for f in result.get("findings") or ()
