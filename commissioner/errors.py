@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import errno
 import reprlib
+from typing import NotRequired
 
 from typing_extensions import TypedDict
 
@@ -38,33 +39,39 @@ OF_DISK = frozenset({errno.ENOSPC, errno.EROFS, errno.EIO, errno.EFBIG, getattr(
 
 
 class ErrorDocument(TypedDict):
-    """An error as JSON: `kind` is its class; `value` and `limit` are numbers, words, or whatever else was seen and allowed."""
+    """An error as JSON: `kind` is its class; `value` and `limit` are numbers, words, or whatever else was seen and allowed; `unit` is
+    that of those which are numbers, where they have one."""
 
     kind: str
     what: str
     step: str
     value: object
     limit: object
+    unit: NotRequired[str]
     remedy: str
 
 
 class CommissionerError(Exception):
-    """What happened (`str`), where (`step`), what was seen (`value`) and allowed (`limit`), what to do (`remedy`)."""
+    """What happened (`str`), where (`step`), what was seen (`value`) and allowed (`limit`), in which `unit` where they are numbers, what
+    to do (`remedy`)."""
 
     exit_code = 5
     outcome = "faulted"
 
-    def __init__(self, what: str, *, step: str, value: object = None, limit: object = None, remedy: str = "") -> None:
+    def __init__(
+        self, what: str, *, step: str, value: object = None, limit: object = None, remedy: str = "", unit: str = ""
+    ) -> None:
         super().__init__(what)
         self.what = what
         self.step = step
         self.value = NOTHING if value is None else value
         self.limit = limit
         self.remedy = remedy
+        self.unit = unit
 
     def as_dict(self) -> ErrorDocument:
         """The error as the JSON object that every verb prints under `error`."""
-        return {
+        document: ErrorDocument = {
             "kind": type(self).__name__,
             "what": self.what,
             "step": self.step,
@@ -72,6 +79,7 @@ class CommissionerError(Exception):
             "limit": self.limit,
             "remedy": self.remedy,
         }
+        return document | {"unit": self.unit} if self.unit else document
 
 
 class UsageError(CommissionerError):

@@ -164,6 +164,7 @@ class DriveStatus:
     session: int
     trip_cause: int = 0
     trip_text: str = ""
+    trip_unit: str = ""
     present_scale: float = 0.0
     present_bias_v: float = 0.0
     test_time_left_s: float = 0.0

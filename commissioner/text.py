@@ -28,6 +28,11 @@ def shown(value: object, longest: int = LONGEST) -> str:
     return kept if len(text) <= longest else f"{kept}... ({len(text)} characters)"
 
 
+def in_unit(text: str, value: object, unit: str) -> str:
+    """`text`, which shows `value`, with its unit where the value is a number: words have theirs inside."""
+    return f"{text} {unit}" if unit and isinstance(value, int | float) and not isinstance(value, bool) else text
+
+
 def split_address(text: str) -> SplitResult:
     """The parts of an address that somebody gave; none where it is no address, or its port none."""
     try:

@@ -163,6 +163,13 @@ def _heat_sentences(results: Sequence[Result], degc: float | None) -> list[str]:
     return said
 
 
+def _percent(share: float, std: float) -> str:
+    """`+8.00 ± 0.12 %`: a 95 % interval to two digits, the share as far as these."""
+    half = 100 * QUANTILE * std
+    places = max(0, 1 - math.floor(math.log10(half))) if 0.0 < half < math.inf else 1
+    return f"{100 * share:+.{places}f} ± {half:.{places}f} %"
+
+
 def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
     said = []
     for trend in trends:
@@ -173,12 +180,12 @@ def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
         )
         for step in trend.steps:
             said.append(
-                f"{spoken} has moved by {100 * step.relative_change:+.2g} ± {100 * QUANTILE * step.relative_std:.1g} % from {step.run} on "
+                f"{spoken} has moved by {_percent(step.relative_change, step.relative_std)} from {step.run} on "
                 f"(by chance: {step.probability:.1g})"
             )
         if trend.is_sloping and trend.slope_per_year is not None and trend.slope_std is not None:
             said.append(
-                f"{spoken} drifts by {100 * trend.slope_per_year:+.2g} ± {100 * QUANTILE * trend.slope_std:.1g} % a year (by chance: "
+                f"{spoken} drifts by {_percent(trend.slope_per_year, trend.slope_std)} a year (by chance: "
                 f"{trend.slope_probability:.1g})"
             )
         if trend.is_alarm:

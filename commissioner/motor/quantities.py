@@ -31,3 +31,9 @@ FIVE = (
 FOUR = FIVE[:4]
 """What standstill data fix; the fifth follows."""
 FIELDS = tuple(q.field for q in FIVE)
+
+
+def in_shown_unit(field: str, *values: float) -> str:
+    """SI values of one of the five as people read them: `214 mH`, `4 ... 90 mH`."""
+    quantity = next(q for q in FIVE if q.field == field)
+    return f"{' ... '.join(f'{quantity.factor * value:.4g}' for value in values)} {quantity.unit}"

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.quantities import in_shown_unit
 from commissioner.procedure.verdict import Objection
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
@@ -162,9 +163,9 @@ def _objections(row: TunedRow) -> Iterator[Objection]:
         )  # fmt: skip
         return
     low, high = row.plate_low, row.plate_high
-    if row.ours is not None and low is not None and high is not None and not low <= row.ours <= high:
+    if row.field and row.ours is not None and low is not None and high is not None and not low <= row.ours <= high:
         yield Objection(
-            f"{row.name} is not physical for this nameplate", row.ours, f"{low:.4g} ... {high:.4g}",
+            f"{row.name} is not physical for this nameplate", in_shown_unit(row.field, row.ours), in_shown_unit(row.field, low, high),
             "check the plate in the drive, the motor's connection, and the drive file's scale and convention",
         )  # fmt: skip
     if len(row.values) < FEWEST:

@@ -12,6 +12,7 @@ from commissioner.identify.analysis import Identification, axis_at
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
 from commissioner.motor.plate_match import PlateMatch, plate_match, sure_mismatch
+from commissioner.motor.quantities import in_shown_unit
 from commissioner.procedure.plan import Acceptance
 from commissioner.records import Signal
 
@@ -131,8 +132,8 @@ def _outside(combined: Mapping[str, Quantity], box: ParameterBox) -> Iterator[Ob
         if not low <= value <= high:
             yield Objection(
                 f"{name} is not physical for this nameplate",
-                value,
-                f"{low:.4g} ... {high:.4g}",
+                in_shown_unit(name, value),
+                in_shown_unit(name, low, high),
                 "check the motor's connection and that --motor is the motor at the drive",
             )
 

@@ -298,6 +298,7 @@ class DriveProfile:
     status_bits: Mapping[str, int] = field(default_factory=dict)
     interlock_bits: Mapping[str, int] = field(default_factory=dict)
     faults: Mapping[int, str] = field(default_factory=dict)
+    trip_units: Mapping[int, str] = field(default_factory=dict)
     exceptions: Mapping[int, str] = field(default_factory=dict)
     limits: DriveLimits = field(default_factory=DriveLimits)
     unknown: Mapping[str, str] = field(default_factory=dict)

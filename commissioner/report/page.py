@@ -144,14 +144,15 @@ td { border-bottom:1px solid var(--rule); padding:5px 10px 5px 0; vertical-align
 tr.good td:first-child { box-shadow:inset 3px 0 var(--good); padding-left:10px } tr.warn td:first-child { box-shadow:inset 3px 0 var(--warn); padding-left:10px }
 tr.bad td:first-child { box-shadow:inset 3px 0 var(--bad); padding-left:10px } figure { margin:8px 0 16px } figure svg,figure img { width:100%; height:auto }
 figcaption { color:var(--muted); font-size:13px } p { margin:0 0 10px; max-width:80ch } footer { color:var(--muted); font-size:12.5px }
-.wide { overflow-x:auto } @media print { body { background:#fff } header,section { break-inside:avoid; border-color:#bbb } }
+.wide { overflow-x:auto } @media print { body { background:#fff } header,section { border-color:#bbb }
+  header,figure,tr { break-inside:avoid } h2,thead { break-after:avoid } .wide { overflow:visible } }
 </style></head><body><main>
 <header><h1>{{ page.title }}</h1><p class="headline">{{ page.headline }}</p>
 <dl>{% for name, value in page.facts %}<div><dt>{{ name }}</dt><dd>{{ value }}</dd></div>{% endfor %}</dl></header>
 {% for section in page.sections %}<section><h2>{{ section.title }}</h2>
 {% for part in section.parts %}
 {% if kind(part) == "Table" %}<div class="wide"><table>{% if part.caption %}<caption>{{ part.caption }}</caption>{% endif %}
-<thead><tr>{% for cell in part.header %}<th>{{ cell }}</th>{% endfor %}</tr></thead><tbody>
+<thead><tr>{% for cell in part.header %}<th scope="col">{{ cell }}</th>{% endfor %}</tr></thead><tbody>
 {% for row in part.rows %}<tr class="{{ part.tones[loop.index0] if part.tones else 'plain' }}">{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</tbody></table></div>
 {% elif kind(part) == "Picture" %}<figure>{{ markup(part.markup) }}<figcaption>{{ part.caption }}</figcaption></figure>

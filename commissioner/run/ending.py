@@ -110,7 +110,7 @@ def write_lost(failure: OSError, folder: RunFolder) -> WriteBackFailed:
     """The disk took no more in the middle of a write-back or a restore."""
     lost = archive_lost(folder.path, failure, "; the drive holds its old or its new parameters")
     return WriteBackFailed(
-        lost.what, step=lost.step, value=lost.value, limit=lost.limit,
+        lost.what, step=lost.step, value=lost.value, limit=lost.limit, unit=lost.unit,
         remedy="make room, then `commissioner restore` this run",
     )  # fmt: skip
 

@@ -22,4 +22,5 @@ def judge_applied(seen_v: Signal, asked_v: Signal, peaks_v: float, bias_v: float
     return StopReason(
         "the drive applies more than it was asked for", largest_v, most_v,
         "see that nothing else writes to this drive: a second master, a panel, a program on another computer",
+        unit="V",
     )  # fmt: skip

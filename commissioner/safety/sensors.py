@@ -152,7 +152,7 @@ def _culprit(current: Signal, cosines: Signal) -> str:
 
 
 def _distrusted(what: str, value: float, limit: str, remedy: str = CHECK) -> StopReason:
-    return StopReason(what, value, limit, remedy, is_fault=True)
+    return StopReason(what, value, limit, remedy, is_fault=True, unit="A")
 
 
 def _phases(block: SampleBlock) -> Signal:

@@ -13,13 +13,15 @@ from commissioner.records import DriveStatus, SampleBlock, peak
 
 @dataclass(frozen=True)
 class StopReason:
-    """Why the test must end now. `is_fault`: the drive or the data failed; otherwise a guard acted."""
+    """Why the test must end now. `is_fault`: the drive or the data failed; otherwise a guard acted. `unit`: of value and limit where they
+    are numbers."""
 
     what: str
     value: float | str
     limit: float | str
     remedy: str
     is_fault: bool = False
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             current,
             limits.current_a,
             "check the motor's rated current and its connection; a shorted winding does this too",
+            unit="A",
         )
     if not math.isfinite(flux_fraction) or flux_fraction > limits.flux_fraction:
         return StopReason(
@@ -53,6 +56,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             flux_fraction,
             limits.flux_fraction,
             "lower limits.flux_fraction, and check rated voltage and frequency of the plate",
+            unit="p.u.",
         )
     if block.clipped:
         return StopReason(
@@ -61,6 +65,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             "inside the range",
             "lower limits.current_fraction or fit a drive of higher rated current",
             is_fault=True,
+            unit="A",
         )
     if energised_s > limits.axis_time_s:
         return StopReason(
@@ -68,6 +73,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             energised_s,
             limits.axis_time_s,
             "raise limits.axis_time_s",
+            unit="s",
         )
     if not block.age_s <= limits.age_s:
         return StopReason(
@@ -76,6 +82,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             limits.age_s,
             "use a faster link or a host that is less busy",
             is_fault=True,
+            unit="s",
         )
     lost_s = block.lost_before * block.sample_period_s
     if lost_s > limits.lost_samples_s:
@@ -85,6 +92,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             limits.lost_samples_s,
             "use a faster link, or a decimation the link can carry",
             is_fault=True,
+            unit="s",
         )
     return _outside("the DC link left its range", block.dc_link_v, *limits.dc_link_v, "check the supply")
 
@@ -98,13 +106,16 @@ def judge_status(status: DriveStatus, limits: WatchLimits) -> StopReason | None:
             status.trip_limit,
             "remove the cause, reset the fault at the drive, start again",
             is_fault=True,
+            unit=status.trip_unit,
         )
     if status.heatsink_degc > limits.heatsink_degc:
         return StopReason(
-            "the heatsink is too hot", status.heatsink_degc, limits.heatsink_degc, "let the drive cool down"
+            "the heatsink is too hot", status.heatsink_degc, limits.heatsink_degc, "let the drive cool down", unit="°C"
         )
     if status.winding_degc > limits.winding_degc:
-        return StopReason("the winding is too hot", status.winding_degc, limits.winding_degc, "let the motor cool down")
+        return StopReason(
+            "the winding is too hot", status.winding_degc, limits.winding_degc, "let the motor cool down", unit="°C"
+        )
     return _outside("the DC link left its range", status.dc_link_v, *limits.dc_link_v, "check the supply")
 
 
@@ -113,13 +124,13 @@ def stop_if(reason: StopReason | None, step: str = "watch") -> None:
     if reason is None:
         return
     kind = DriveFault if reason.is_fault else Aborted
-    raise kind(reason.what, step=step, value=reason.value, limit=reason.limit, remedy=reason.remedy)
+    raise kind(reason.what, step=step, value=reason.value, limit=reason.limit, remedy=reason.remedy, unit=reason.unit)
 
 
 def _outside(what: str, value: float, low: float, high: float, remedy: str) -> StopReason | None:
     if low <= value <= high:
         return None
-    return StopReason(what, value, f"{low:g} ... {high:g} V", remedy, is_fault=True)
+    return StopReason(what, value, f"{low:g} ... {high:g} V", remedy, is_fault=True, unit="V")
 
 
 def _peak(block: SampleBlock) -> float:

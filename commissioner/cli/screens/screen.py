@@ -19,7 +19,7 @@ from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.motor.quantities import FIVE
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
 from commissioner.run.archive.documents import Loss
-from commissioner.text import LONGEST, visible
+from commissioner.text import LONGEST, in_unit, visible
 from commissioner.text import shown as cut
 
 SENTENCE = 2000
@@ -83,7 +83,7 @@ def failure(error: CommissionerError) -> None:
     err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
     for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
         if fact not in (None, ""):
-            err.print(f"  [dim]{name:<7}[/]{text(shown(fact), SENTENCE)}")
+            err.print(f"  [dim]{name:<7}[/]{text(shown(fact, error.unit), SENTENCE)}")
 
 
 def text(value: object, longest: int = LONGEST) -> str:
@@ -103,9 +103,9 @@ def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, r
     return made
 
 
-def shown(value: object) -> str:
-    """A value as a person reads it: four digits, no tails."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def shown(value: object, unit: str = "") -> str:
+    """A value as a person reads it: four digits, no tails, a number in its unit."""
+    return in_unit(f"{value:.4g}" if isinstance(value, float) else str(value), value, unit)
 
 
 def quantity(value: float, std: float, unit: str) -> str:
@@ -152,7 +152,7 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     if error:
         for name in ("step", "value", "limit", "remedy"):
             if error.get(name) not in (None, ""):
-                out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name]))}")
+                out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name], error.get('unit', '')))}")
     if document.get("parameters"):
         out.print(
             table(

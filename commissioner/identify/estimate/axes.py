@@ -26,6 +26,8 @@ FLOOR = 2e-4
 """No axis result is believed better than this, relatively, when axes are compared: what models leave out varies with
 them."""
 
+FEWEST_ORIENTATIONS = 3
+
 
 @dataclass(frozen=True)
 class AxisEstimate:
@@ -96,9 +98,9 @@ def _log_covariance(axis: AxisEstimate) -> Matrix:
 
 
 def _remarks(axes: Sequence[AxisEstimate]) -> tuple[str, ...]:
-    orientations = {round(a.axis_deg % 180.0, 3) for a in axes}
+    orientations = _orientations(axes)
     remarks = []
-    if len(orientations) < 3:
+    if not _pattern_is_visible(axes):
         remarks.append(f"{len(orientations)} orientation(s): sensor gain and anisotropy need at least three")
     if len(orientations) == len(axes) and len(axes) > 1:
         remarks.append("no orientation was repeated: heating cannot be told from differences between axes")
@@ -111,7 +113,7 @@ _GROUPS: dict[Cause, tuple[int, ...]] = {Cause.SENSOR_GAIN: (4, 5), Cause.ANISOT
 def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[Matrix]) -> list[Finding]:
     """Of all sets of causes the one that lowers chi-square most beyond chance. Causes added one at a time and never taken
     back name a sensor beside every large anisotropy."""
-    possible = [c for c in _GROUPS if c is not Cause.HEATING or _order_is_visible(axes)]
+    possible = [c for c in _GROUPS if (_order_is_visible if c is Cause.HEATING else _pattern_is_visible)(axes)]
     sets = [list(s) for n in range(len(possible) + 1) for s in itertools.combinations(possible, n)]
     chosen = min(sets, key=lambda s: _fit(axes, logs, covariances, s)[0] + sum(_price(c) for c in s))
     chi_square, degrees, solution, covariance = _fit(axes, logs, covariances, chosen)
@@ -130,7 +132,16 @@ def _price(cause: Cause) -> float:
 
 def _order_is_visible(axes: Sequence[AxisEstimate]) -> bool:
     """Heating shows in a repeated orientation, or where there are more tests than a 2 theta pattern can absorb."""
-    return len({round(a.axis_deg % 180.0, 3) for a in axes}) < len(axes) or len(axes) > 3
+    return len(_orientations(axes)) < len(axes) or len(axes) > 3
+
+
+def _pattern_is_visible(axes: Sequence[AxisEstimate]) -> bool:
+    """Mean, cosine and sine of 2 theta are three unknowns: two orientations leave their sizes open."""
+    return len(_orientations(axes)) >= FEWEST_ORIENTATIONS
+
+
+def _orientations(axes: Sequence[AxisEstimate]) -> set[float]:
+    return {round(a.axis_deg % 180.0, 3) for a in axes}
 
 
 def _fit(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from commissioner.identify.intake.stretches import Stretch, refused
-from commissioner.motor.circuit import Quantity
+from commissioner.motor.circuit import QUANTILE, Quantity
 
 MOST_PERIODS = 3.0
 """By which the currents may lie off the voltage, either way; what is beyond is another fault than a late channel."""
@@ -41,7 +41,7 @@ class TimeShift:
     @property
     def sentence(self) -> str:
         return (
-            f"the currents lie {self.value_s * 1e6:+.4g} +- {self.std_s * 1e6:.2g} us "
+            f"the currents lie {self.value_s * 1e6:+.4g} +- {QUANTILE * self.std_s * 1e6:.2g} us "
             f"({self.value_s / self.sample_period_s:+.3g} sample periods) behind the voltage: taken into account"
         )
 

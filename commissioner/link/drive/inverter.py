@@ -357,6 +357,7 @@ class Inverter:
                     step="enable",
                     value=status.trip_value,
                     limit=status.trip_limit,
+                    unit=status.trip_unit,
                     remedy=f"remove the cause of: {status.fault_text}",
                 )
             if self.now_s() > end:

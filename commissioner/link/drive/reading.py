@@ -54,6 +54,7 @@ def read_status(items: Items) -> DriveStatus:
         session=_whole(seen, "session_id"),
         trip_cause=trip,
         trip_text=profile.fault_text(trip),
+        trip_unit=profile.trip_units.get(trip, ""),
         present_scale=_real(seen, "present_scale"),
         present_bias_v=_real(seen, "present_bias_v"),
         test_time_left_s=_real(seen, "test_time_left_s"),

@@ -128,6 +128,7 @@ def _profile(model: DriveFile, file: str) -> DriveProfile:
         status_bits=_status_bits(model, file),
         interlock_bits=model.interlock_bits,
         faults=_by_code(model.faults, "faults", file),
+        trip_units=_by_code(model.trip_units, "trip_units", file),
         exceptions=_by_code(model.exceptions, "exceptions", file),
         limits=DriveLimits(**model.limits.model_dump()),
         unknown=model.unknown,

@@ -213,6 +213,7 @@ class DriveFile(Table):
     status_bits: dict[str, Bit] = {}
     interlock_bits: dict[str, Bit] = {}
     faults: dict[str, str] = {}
+    trip_units: dict[str, str] = {}
     exceptions: dict[str, str] = {}
     limits: LimitsTable = LimitsTable()
     unknown: dict[str, str] = {}

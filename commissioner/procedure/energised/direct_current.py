@@ -87,7 +87,7 @@ class DirectCurrent:
         if seen_a * math.copysign(1.0, voltage_v) < -AGAINST * aimed_a:
             raise DriveFault(
                 "the current flows against the voltage: a current sensor has the wrong sign", step=self._where,
-                value=seen_a, limit=f"current of the sign of {voltage_v:.3g} V",
+                value=seen_a, unit="A", limit=f"current of the sign of {voltage_v:.3g} V",
                 remedy="check sign and order of the current sensors",
             )  # fmt: skip
         return passed_s, seen_a
@@ -121,6 +121,6 @@ class DirectCurrent:
         self.findings.peak_flux_fraction = max(self.findings.peak_flux_fraction, self.peak_fraction)
         if flux_wb > self._limit_wb:
             raise Aborted(
-                "the flux reached its limit", step=self._where, value=flux_wb, limit=self._limit_wb,
+                "the flux reached its limit", step=self._where, value=flux_wb, limit=self._limit_wb, unit="Wb",
                 remedy="check rated voltage, frequency and connection of the plate; lower limits.flux_fraction",
             )  # fmt: skip

@@ -127,7 +127,7 @@ class UnderTest:
         if reading.advice is FluxAdvice.ABORT:
             raise Aborted(
                 "the flux reached its limit and kept rising", step=f"multitone test, axis {self._axis_deg:g} deg",
-                value=reading.fraction * self.limit_wb, limit=self.limit_wb,
+                value=reading.fraction * self.limit_wb, limit=self.limit_wb, unit="Wb",
                 remedy="check rated voltage, frequency and connection of the plate; lower limits.flux_fraction",
             )  # fmt: skip
         is_new = reading.advice is not FluxAdvice.HOLD and abs(reading.permitted_scale - self.scale) > 1e-3

@@ -21,6 +21,7 @@ from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import digits, half_width, with_interval
+from commissioner.report.sheet.words import spoken
 
 _COLUMNS = (
     Column("Parameter"),
@@ -81,7 +82,7 @@ def _values(subject: Subject) -> Markup:
         marks.section("What the values hold for", marks.facts(_conditions(subject))),
     ]
     if result["remarks"]:
-        remarks = (sentence(str(remark).replace("+-", "±")) for remark in result["remarks"])
+        remarks = (sentence(spoken(str(remark))) for remark in result["remarks"])
         parts.append(marks.section("Remarks", *(marks.paragraph(remark, kind="small") for remark in remarks)))
     return Markup("\n").join(parts)
 

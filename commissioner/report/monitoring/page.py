@@ -230,6 +230,6 @@ def _audit(seen: Observation) -> Section:
         Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones),
         f"Channels as used: {channels}.",
         f"Sensors are trusted to {trust.gain_std:.1%} in gain. The currents were found to lag the voltages by "
-        f"{1e6 * seen.fitted.delay_s:.0f} ± {1e6 * seen.fitted.delay_std_s:.0f} us of sensor delay (taken before: 0 ± "
-        f"{trust.skew_std_s * 1e6:.0f} us). Beyond what was corrected, channels may differ by {trust.asymmetry:.1%}.",
+        f"{1e6 * seen.fitted.delay_s:.0f} ± {1e6 * seen.fitted.delay_std_s:.0f} µs of sensor delay (taken before: 0 ± "
+        f"{trust.skew_std_s * 1e6:.0f} µs). Beyond what was corrected, channels may differ by {trust.asymmetry:.1%}.",
     )

@@ -12,6 +12,7 @@ from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import digits, half_width, held, with_interval
+from commissioner.report.sheet.words import check_name, check_unit, seen_and_limit, spoken
 
 _TOLD: Mapping[str, Callable[[Record], str]] = {
     "state_entered": lambda r: f"{r['state']}{_on_axis(r)}: {r['because']}",
@@ -38,8 +39,8 @@ _TOLD: Mapping[str, Callable[[Record], str]] = {
     "parameters_written": lambda r: (
         f"{len(r['written'])} values written and read back{', stored' if r['is_stored'] else ''}"
     ),
-    "error": lambda r: (
-        f"{r.get('what', 'failure')} (step {r.get('step')}, seen {r.get('value')}, limit {r.get('limit')})"
+    "error": lambda r: "{} (step {}, seen {}, limit {})".format(
+        r["what"], r["step"], *seen_and_limit(r, r.get("unit") or "")
     ),
     "disarmed": lambda r: (
         f"output off, {'confirmed by the drive: ' + str(r['verified']['state']) if r['verified']['is_confirmed'] else 'NOT confirmed'}; {r['because']}"
@@ -48,6 +49,8 @@ _TOLD: Mapping[str, Callable[[Record], str]] = {
 }
 """What is told of the journal, each kind of record in its own words."""
 _MOST_EVENTS = 60
+_UNITS = (("_per_s", "1/s"), ("_s", "s"), ("seconds", "s"), ("_percent", "%"), ("_fraction", "of rated"))
+"""Of a procedure's numbers, by how their keys end."""
 _T_MODEL = (
     ("R", "s", "stator resistance", "stator_resistance_ohm", 1.0, "Ω"),
     ("R", "r", "rotor resistance", "rotor_resistance_ohm", 1.0, "Ω"),
@@ -111,11 +114,16 @@ def _check(row: Record) -> tuple[Text, ...]:
     good = bool(row["has_passed"])
     result = marks.judged("passed" if good else "failed", is_good=good)
     return (
-        str(row["name"]),
-        _plain(row["value"]),
-        _plain(row["limit"]),
+        check_name(str(row["name"])),
+        *_checked(row),
         result if good else Markup("{} {}").format(result, row["remedy"]),
     )
+
+
+def _checked(row: Record) -> tuple[str, str]:
+    unit = check_unit(str(row["name"]))
+    seen, limit = seen_and_limit(row, unit)
+    return seen, limit.replace(" within", f" {unit}".rstrip() + " within")
 
 
 def _event(line: Record) -> tuple[Text, ...]:
@@ -123,7 +131,7 @@ def _event(line: Record) -> tuple[Text, ...]:
         told = _TOLD[line["kind"]](line["record"])
     except (KeyError, TypeError, IndexError):  # of an older archive, or damaged
         told = str(line["kind"]).replace("_", " ")
-    return str(line["utc"])[11:23], marks.capitalised(told)
+    return str(line["utc"])[11:23], spoken(marks.capitalised(told))
 
 
 def _on_axis(record: Record) -> str:
@@ -173,16 +181,19 @@ def _procedure(subject: Subject) -> Markup:
         is_repeated = len(subject.planned_deg) > len(plan["axes_deg"])
         rows.append(("axes", f"{axes}{', the first again' if is_repeated else ''}"))
     for group in ("limits", "excitation", "supervision"):
-        rows += [(key, f"{value:g}") for key, value in (plan.get(group) or {}).items()]
+        rows += [(key, _set(key, value)) for key, value in (plan.get(group) or {}).items()]
     for key, value in (plan.get("acceptance") or {}).items():
-        rows.append(
-            (
-                key,
-                f"{value:g} (± {digits(half_width(value), 2)} % here)" if key.endswith("std_percent") else f"{value:g}",
-            )
-        )
+        here = f" (± {digits(half_width(value), 2)} % here)" if key.endswith("std_percent") else ""
+        rows.append((key, f"{_set(key, value)}{here}"))
     figure = marks.figure("The circuit of this report, one axis", _CIRCUIT)
-    return marks.section("Procedure, as run", marks.facts(rows), figure, level=3)
+    return marks.section("Procedure, as run: the keys of its file", marks.facts(rows), figure, level=3)
+
+
+def _set(key: str, value: float) -> str:
+    """A number of the procedure in the unit that its key ends with."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g} {next((unit for ending, unit in _UNITS if key.endswith(ending)), '')}".rstrip()
 
 
 def _circuit(subject: Subject) -> Markup:
@@ -200,8 +211,10 @@ def _circuit(subject: Subject) -> Markup:
         parts.append(marks.table(columns, rows, "keep dense"))
         parts.append(
             marks.paragraph(
-                f"Assumed: {model['assumption']}. At standstill four values can be measured; the fifth of a T circuit is "
-                "always an assumption. The intervals do not hold it.", kind="small",
+                spoken(
+                    f"Assumed: {model['assumption']}. At standstill four values can be measured; the fifth of a T circuit is "
+                    "always an assumption. The intervals do not hold it."
+                ), kind="small",
             )
         )  # fmt: skip
     if not parts:
@@ -224,7 +237,7 @@ def uncertainty(subject: Subject) -> Markup:
         parts.append(marks.paragraph("Each test at the flux that it reached itself.", kind="small"))
     remarks = [*finding_sentences(subject.result), *(str(remark) for remark in subject.result.get("remarks") or ())]
     if remarks:
-        lines = Markup("").join(Markup("<li>{}</li>").format(f"{marks.capitalised(r)}.") for r in remarks)
+        lines = Markup("").join(Markup("<li>{}</li>").format(spoken(f"{marks.capitalised(r)}.")) for r in remarks)
         parts.append(Markup('<h3>Remarks of the estimator</h3><ul class="lines">{}</ul>').format(lines))
     return Markup("\n").join(parts)
 
@@ -237,9 +250,3 @@ def _test(axis: Record) -> tuple[Text, ...]:
     white = axis["whiteness"]
     shown = f"{'yes' if white['is_white'] else 'no'}: {digits(white['statistic'], 2)} of {digits(white['limit'], 3)}"
     return f"{axis['axis_deg']:g}° at {digits(axis['peak_stator_flux_wb'], 3)} Wb", *(cell(q) for q in FOUR), shown
-
-
-def _plain(value: object) -> str:
-    if value is None:
-        return "not told"
-    return digits(value, 3) if isinstance(value, float) else str(value)

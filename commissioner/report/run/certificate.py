@@ -14,7 +14,8 @@ from commissioner.report.run.standing import ACCEPTED
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
-from commissioner.report.sheet.numbers import digits, fixed, half_width, held, like, percent, signed, with_interval
+from commissioner.report.sheet.numbers import counted, digits, half_width, held, like, percent, signed, with_interval
+from commissioner.report.sheet.words import check_name, check_unit, seen_and_limit, spoken, typeset
 
 _COLUMNS = (
     Column("Parameter"),
@@ -26,7 +27,7 @@ _COLUMNS = (
     Column("Register", right=True),
     Column(Markup("Written = read back,<br>drive’s own number"), label="Written = read back"),
 )
-_SEEN = (("DC link in range", "DC link", "V"), ("heatsink temperature, degC", "Heatsink", "°C"))
+_SEEN = (("DC link in range", "DC link"), ("heatsink temperature", "Heatsink"))
 """What the checks saw of the drive."""
 
 
@@ -60,30 +61,36 @@ def _verdict(subject: Subject) -> Markup:
     return Markup('<div class="verdict">{}<h1>{}</h1><p>{}</p></div>').format(mark, title, sentence)
 
 
-def _said(subject: Subject) -> tuple[str, str]:
+def _said(subject: Subject) -> tuple[str, Text]:
     """Title and sentence; the title of a run that went wrong says what the drive holds."""
     tests = len(subject.tests)
-    agree = f", the {_tests(tests)} agree" if tests > 1 else ""
+    agree = f", the {counted(tests, 'test')} agree" if tests > 1 else ""
     if subject.standing == ACCEPTED:
         return (
             "Accepted, not written: the drive holds its old values",
-            f"Each value is surer than it must be{agree}, and no limit was reached. Nothing was written into the drive.",
+            f"Each value is surer than it must be{agree}, and {_within(subject)}. Nothing was written into the drive.",
         )
     if subject.is_good and not subject.parameters:
-        return "Commissioned", f"{sentence(str(subject.result['reason']))} {_kept(subject) if subject.written else ''}"
+        return "Commissioned", Markup("{} {}").format(
+            _said_by(subject.result["reason"]), _kept(subject) if subject.written else ""
+        )
     if subject.is_good:
         return (
-            f"Commissioned: {_counted(len(subject.written))} values accepted, written and read back",
-            f"Each value is surer than it must be{agree}, and no limit was reached. {_kept(subject)}",
+            f"Commissioned: {counted(len(subject.written), 'value')} accepted, written and read back",
+            f"Each value is surer than it must be{agree}, and {_within(subject)}. {_kept(subject)}",
         )
-    reason = sentence(str(subject.result["reason"]))
+    reason = _said_by(subject.result["reason"])
     if subject.outcome == "rejected":
-        return "Not good enough: nothing written", f"{reason} The drive is as it was found."
+        return "Not good enough: nothing written", Markup("{} The drive is as it was found.").format(reason)
     title = {"aborted": "Aborted", "faulted": "Broken off by a fault"}.get(
         subject.outcome, subject.outcome.capitalize()
     )
     wrote = bool(subject.written)
     return f"{title}: {'see what the drive holds' if wrote else 'nothing written'}", reason
+
+
+def _within(subject: Subject) -> str:
+    return "the flux guard took the amplitude back" if subject.guard.get("acted") else "no limit was reached"
 
 
 def _kept(subject: Subject) -> str:
@@ -99,7 +106,7 @@ def _remedies(subject: Subject) -> Iterator[Text]:
     for remedy in (error.get("remedy"), *(o["remedy"] for o in subject.result.get("objections") or ())):
         if remedy and remedy not in seen:
             seen.add(remedy)
-            yield marks.coded(sentence(str(remedy)))
+            yield marks.coded(sentence(typeset(str(remedy))))
     if subject.written:
         yield marks.coded(f"Put the old values back: `commissioner restore {subject.run}`")
     yield "Go through the checks again, then measure again." if seen else "Measure again."
@@ -115,14 +122,12 @@ def _why(subject: Subject) -> Markup:
             Column("What makes it better"),
         )
         rows: list[tuple[Text, ...]] = [
-            (_worded(str(o["what"])), _bold(o["value"]), _shown(o["limit"]), marks.coded(sentence(str(o["remedy"]))))
-            for o in objections
+            (spoken(str(o["what"])), *_weighed(o), marks.coded(sentence(typeset(str(o["remedy"]))))) for o in objections
         ]
         return marks.section("Why", marks.table(columns, rows), kind="why")
     columns = (Column("Step"), Column("Seen", right=True), Column("Limit", right=True), Column("What happened"))
     row = (
-        str(error.get("step") or "—"), _bold(error.get("value")), _shown(error.get("limit")),
-        sentence(str(error.get("what") or subject.result["reason"])),
+        str(error.get("step") or "—"), *_weighed(error), _said_by(error.get("what") or subject.result["reason"]),
     )  # fmt: skip
     return marks.section("Why", marks.table(columns, [row]), kind="why")
 
@@ -144,7 +149,7 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
         yield (
             "Energised in all",
             _energised(result),
-            f"{_tests(len(subject.estimates))} begun",
+            f"{counted(len(subject.estimates), 'test')} begun",
         )
         yield (
             "Written",
@@ -158,7 +163,7 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
     )  # fmt: skip
     flux, limit = subject.peak_flux_wb, subject.guard.get("limit_wb")
     yield (
-        "Highest stator flux", f"{digits(flux, 3)} Wb" if flux else "none",
+        "Highest flux, by the guard", f"{digits(flux, 3)} Wb" if flux else "none",
         f"limit {digits(limit, 3)} Wb" if limit else "",
     )  # fmt: skip
     total = f"{subject.samples:,}".replace(",", " ")
@@ -204,7 +209,7 @@ def _drive(subject: Subject) -> Markup:
     drive = subject.result.get("drive") or {}
     if not drive:
         return marks.section("Drive", marks.paragraph("It did not say who it is."))
-    seen = {row["name"]: row["value"] for row in subject.result.get("checks") or ()}
+    seen = {check_name(row["name"]): row for row in subject.result.get("checks") or ()}
     rows: list[tuple[Text, Text]] = [
         ("Type", str(drive["drive_type"])),
         ("Serial no.", _known(drive["serial_number"])),
@@ -214,7 +219,7 @@ def _drive(subject: Subject) -> Markup:
         rows.append(("Register map", str(drive["map_version"])))
     if (rated := drive["rated_drive_current_a"]) is not None and math.isfinite(rated):
         rows.append(("Rated", f"{rated:.1f} A, switching at {1e-3 * drive['switching_frequency_hz']:g} kHz"))
-    rows += [(words, f"{_shown(seen[check])} {unit}") for check, words, unit in _SEEN if seen.get(check) is not None]
+    rows += [(words, seen_and_limit(seen[check], check_unit(check))[0]) for check, words in _SEEN if check in seen]
     return marks.section("Drive", marks.facts(rows))
 
 
@@ -236,7 +241,7 @@ def _measurement(subject: Subject) -> Markup:
     rows.append(
         (
             "Energised",
-            _energised(result) + (f" in {_tests(len(subject.tests))}: {axes}" if axes else ""),
+            _energised(result) + (f" in {counted(len(subject.tests), 'test')}: {axes}" if axes else ""),
         )
     )
     if (seconds := subject.seconds) is not None:
@@ -344,10 +349,12 @@ def _next(subject: Subject) -> Iterator[Text]:
     yield "Measure again when motor, cable or drive was changed."
     longer = subject.findings.longer_test
     if longer is not None:
-        yield (
-            sentence(longer.sentence.replace("standard errors", "intervals"))
-            if "nothing" in longer.sentence
-            else sentence(longer.sentence)
+        yield spoken(
+            sentence(
+                longer.sentence.replace("standard errors", "intervals")
+                if "nothing" in longer.sentence
+                else longer.sentence
+            )
         )
 
 
@@ -423,13 +430,9 @@ def _std_percent(measured: Record) -> float:
     return 100.0 * float(measured["std"] or 0.0) / abs(float(measured["value"]))
 
 
-def _worded(text: str) -> Text:
-    """A parameter's field name as its symbol."""
-    for name, quantity in BY_FIELD.items():
-        if name in text:
-            before, _, after = text.partition(name)
-            return Markup("{}{}{}").format(before, quantity.symbol, after)
-    return text
+def _said_by(reason: object) -> Text:
+    """A reason of the core as a sentence."""
+    return sentence(spoken(str(reason)))
 
 
 def _known(value: object) -> str:
@@ -437,14 +440,10 @@ def _known(value: object) -> str:
     return "unknown" if value is None or value == "" else str(value)
 
 
-def _shown(value: object) -> str:
-    if value is None or value == "":
-        return "—"
-    return digits(value, 3) if isinstance(value, float) else str(value)
-
-
-def _bold(value: object) -> Markup:
-    return Markup("<b>{}</b>").format(_shown(value))
+def _weighed(facts: Record) -> tuple[Text, Text]:
+    """What was seen beside what was allowed."""
+    seen, limit = seen_and_limit(facts, str(facts.get("unit") or ""))
+    return Markup("<b>{}</b>").format(seen), limit
 
 
 def sentence(text: str) -> str:
@@ -453,15 +452,6 @@ def sentence(text: str) -> str:
     return marks.capitalised(text) + ("" if text.endswith((".", "!", "?")) else ".")
 
 
-def _counted(number: int) -> str:
-    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-    return words[number] if number < len(words) else fixed(number, 0)
-
-
 def _energised(result: Record) -> str:
     seconds = result["energised_s"]
     return "not known" if seconds is None else f"{seconds:.1f} s"
-
-
-def _tests(number: int) -> str:
-    return f"{_counted(number)} test" + ("" if number == 1 else "s")

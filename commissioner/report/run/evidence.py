@@ -15,7 +15,7 @@ from commissioner.report.run.quantities import FOUR, Quantity
 from commissioner.report.run.subject import Record, Session, Subject, Test
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.drawing import Panel, envelope, padded
-from commissioner.report.sheet.numbers import digits, half_width, with_interval
+from commissioner.report.sheet.numbers import counted, digits, half_width, with_interval
 
 WINDOW_S = 0.03
 """Of the envelope that stands for a line of many samples."""
@@ -46,7 +46,7 @@ def _limits_kept(subject: Subject) -> Markup:
     caption = (
         "Each test: direct currents, tones, small tones on a direct current (test 1 looks first). Filled: smallest to largest of "
         f"each {1e3 * WINDOW_S:.0f} ms. Flux is that of the fitted model. "
-        + (f"The highest of all energised samples is {digits(peak, 3)} Wb; the guard {acted}." if peak else "")
+        + (f"The guard, which judges while measuring, saw {digits(peak, 3)} Wb at most and {acted}." if peak else "")
         + (f" {undrawn} more tests are not drawn." if undrawn > 0 else "")
     )
     drawn = over_time(subject, subject.trip_current_a, subject.guard.get("limit_wb"))
@@ -203,7 +203,10 @@ def _while_measuring(subject: Subject) -> Markup:
         "samples together with the bent iron and stands at {} Wb: that is why {} may end elsewhere. Pale: 95 % interval of the last test."
     ).format(flux, marks.L_M)
     return marks.figure(
-        "Values while measuring", marks.multiples(panels, 4), caption, aside=f"{len(tests)} tests; black: the result"
+        "Values while measuring",
+        marks.multiples(panels, 4),
+        caption,
+        aside=f"{counted(len(tests), 'test')}; black: the result",
     )
 
 

@@ -16,8 +16,10 @@ def standing(result: Mapping[str, Any]) -> str:
 
 
 def finding_sentences(result: Mapping[str, Any]) -> list[str]:
-    """What the axes' comparison saw, each with its size."""
+    """What the axes' comparison saw, each with its size and 95 % interval."""
+    from commissioner.report.sheet.numbers import half_width, with_interval  # with numpy behind it
+
     return [
-        f"{f['sentence']}, by {100 * abs(f['relative_size']):.2g} ± {100 * f['relative_std']:.2g} %"
+        f"{f['sentence']}, by {with_interval(100 * abs(f['relative_size']), half_width(f['relative_std'], 100))} %"
         for f in result.get("findings") or ()
     ]

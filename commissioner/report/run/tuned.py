@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 from markupsafe import Markup
 
+from commissioner.motor.quantities import in_shown_unit
 from commissioner.records import drive_words
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
-from commissioner.report.sheet.numbers import digits, signed
+from commissioner.report.sheet.numbers import counted, digits, signed
+from commissioner.report.sheet.words import seen_and_limit, spoken
 
 _COLUMNS = (
     Column("Result"),
@@ -19,7 +21,7 @@ _COLUMNS = (
     Column("Median", right=True),
     Column("Spread", right=True),
     Column("Trend", right=True),
-    Column("Per phase, SI", right=True),
+    Column("Per phase", right=True),
     Column("The plate allows", right=True),
 )
 
@@ -34,11 +36,13 @@ def tuned_sheet(subject: Subject) -> Markup:
         )
     ]
     if error:
-        facts = [(name, str(error[name])) for name in ("step", "value", "limit", "remedy") if error.get(name)]
+        seen, limit = seen_and_limit(error, str(error.get("unit") or ""))
+        told = {"Step": error.get("step"), "Seen": seen, "Limit": limit, "Do this": error.get("remedy")}
+        facts = [(name, spoken(str(text))) for name, text in told.items() if text]
         parts.append(marks.section("Why", marks.facts(facts), kind="why"))
     for objection in subject.result.get("objections") or ():
-        limit = f"{objection['value']}, limit {objection['limit']}: {objection['remedy']}"
-        parts.append(marks.paragraph(f"{_sentence(str(objection['what']))} {limit}"))
+        limit = "{}, limit {}: ".format(*seen_and_limit(objection)) + objection["remedy"]
+        parts.append(marks.paragraph(spoken(f"{_sentence(str(objection['what']))} {limit}")))
     parts.append(marks.section("In the drive", marks.facts(_facts(subject, tune))))
     if tune.get("rows"):
         parts.append(marks.table(_COLUMNS, [_row(row) for row in tune["rows"]]))
@@ -50,22 +54,23 @@ def _facts(subject: Subject, tune: Record) -> Iterator[tuple[Text, Text]]:
     if drive:
         yield "Drive", drive_words(str(drive["drive_type"]), drive["serial_number"])
     yield "It holds", str(tune["in_the_drive"])
-    yield "Tuned", f"{len(tune['repeats'])} times, {tune['form']}"
+    yield "Tuned", f"{counted(len(tune['repeats']), 'time')}, {tune['form']}"
     for remark in subject.result.get("remarks") or ():
-        yield "Remark", str(remark)
+        yield "Remark", spoken(str(remark))
 
 
 def _row(row: Record) -> tuple[Text, ...]:
-    is_known = row["ours"] is not None
+    field = row["field"] if row["ours"] is not None else None
+    unit = str(row["unit"])
     return (
         str(row["name"]).replace("_", " "),
-        digits(row["before"], 5),
-        ", ".join(digits(value, 5) for value in row["values"]),
-        f"{digits(row['median'], 5)} {row['unit']}",
+        f"{digits(row['before'], 5)} {unit}",
+        f"{', '.join(digits(value, 5) for value in row['values'])} {unit}",
+        f"{digits(row['median'], 5)} {unit}",
         f"{digits(row['spread_percent'], 2)} %",
         f"{signed(row['trend_percent'], 2)} %",
-        f"{digits(row['ours'], 5)} ({row['conversion']})" if is_known else str(row["conversion"]),
-        f"{digits(row['plate_low'], 3)} ... {digits(row['plate_high'], 3)}" if is_known else "not judged",
+        f"{in_shown_unit(field, row['ours'])} ({row['conversion']})" if field else str(row["conversion"]),
+        in_shown_unit(field, row["plate_low"], row["plate_high"]) if field else "not judged",
     )
 
 

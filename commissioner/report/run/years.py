@@ -9,7 +9,8 @@ from commissioner.report.run.quantities import BY_FIELD, Quantity
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.drawing import Panel, padded
 from commissioner.report.sheet.marks import Column
-from commissioner.report.sheet.numbers import digits, half_width, signed, with_interval
+from commissioner.report.sheet.numbers import digits, half_width, with_interval
+from commissioner.report.sheet.words import spoken
 
 _SCALES = ((365.25 * 86400.0, "a"), (86400.0, "d"), (3600.0, "h"), (60.0, "min"))
 """Seconds of a unit and its sign: the first of which a motor's history takes more than two."""
@@ -34,7 +35,10 @@ def years_sheet(years: Trends | None) -> Markup:
         [
             marks.figure("The motor over the years", marks.multiples(panels, 2), caption),
             marks.table(_COLUMNS, [_row(trend, q) for trend, q in _shown(years)]),
-            *(marks.paragraph(f"{marks.capitalised(said)}.") for said in (*years.sentences, *years.common.sentences)),
+            *(
+                marks.paragraph(spoken(f"{marks.capitalised(said)}."))
+                for said in (*years.sentences, *years.common.sentences)
+            ),
         ]
     )
 
@@ -46,7 +50,7 @@ def _shown(years: Trends) -> list[tuple[Trend, Quantity]]:
 def _row(trend: Trend, quantity: Quantity) -> tuple[Markup | str, ...]:
     newest, factor, unit = trend.points[-1], quantity.factor, quantity.unit
     slope = "too few runs, or too short a time" if trend.slope_per_year is None or trend.slope_std is None else (
-        f"{signed(100 * trend.slope_per_year, 2)} ± {digits(100 * half_width(trend.slope_std), 2)} %"
+        f"{with_interval(100 * trend.slope_per_year, half_width(trend.slope_std, 100))} %"
     )  # fmt: skip
     return (
         Markup("{} {}").format(quantity.symbol, quantity.words),

@@ -61,12 +61,17 @@ def document(title: str, margins: Margins, pages: Sequence[Page]) -> str:
 
 def _style(margins: Margins) -> str:
     boxes = {
-        "top-left": _quoted(margins.subject), "top-center": _quoted(margins.middle),
-        "top-right": f'{_quoted(margins.run + " · page ")} counter(page) " of " counter(pages)',
+        "top-left": _quoted(_cut(margins.subject, 54)), "top-center": _quoted(_cut(margins.middle, 28)),
+        "top-right": f'{_quoted(_cut(margins.run, 36) + " · page ")} counter(page) " of " counter(pages)',
         "bottom-left": _quoted(margins.below_left), "bottom-right": _quoted(margins.below_right),
     }  # fmt: skip
     texts = " ".join(f"@{name} {{ content: {text} }}" for name, text in boxes.items())
     return f"{_fonts()}\n{_sheet()}\n@page {{ {texts} }}\n"
+
+
+def _cut(text: str, longest: int) -> str:
+    """What fits beside its neighbours in the one line of a margin; the page itself has the whole."""
+    return text if len(text) <= longest else f"{text[: longest - 1].rstrip()}…"
 
 
 def _quoted(text: str) -> str:

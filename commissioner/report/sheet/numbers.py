@@ -62,6 +62,12 @@ def percent(share: float) -> str:
     return f"{digits(100.0 * share, 2)} %"
 
 
+def counted(number: int, noun: str) -> str:
+    """`one test`, `four tests`."""
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+    return f"{words[number] if number < len(words) else number} {noun}{'' if number == 1 else 's'}"
+
+
 def held(value: float) -> str:
     """A drive's own number, to the nine digits that tell two neighbouring 32-bit floats apart."""
     return f"{value:.9g}".replace("-", "−")

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from commissioner.records import drive_words
 from commissioner.report.run.standing import RESTORED_SINCE
+from commissioner.report.sheet.words import NBSP
 from commissioner.service.access.visitors import Visitor
 from commissioner.service.library import Drive
-from commissioner.service.page.texts import NBSP, Texts
+from commissioner.service.page.texts import Texts
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Control

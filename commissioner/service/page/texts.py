@@ -13,11 +13,11 @@ from typing import Any
 from babel.messages.pofile import read_po
 from starlette.requests import HTTPConnection
 
+from commissioner.report.sheet.words import NBSP
 from commissioner.service.problems import Refusal
 
 LANGUAGES = ("en", "de")
 UNIT_SIGNS = {"ohm": "Ω", "degC": "°C", "us": "µs", "1": ""}
-NBSP = "\u00a0"
 CORE = "core"
 """Context of the catalogue's sentences that come from the core; their %(names)s stand for what the core filled in."""
 
@@ -130,13 +130,6 @@ def texts_of(connection: HTTPConnection) -> Texts:
         return Texts(chosen)
     wanted = connection.headers.get("accept-language", "en").split(",")
     return Texts(next((w[:2].lower() for w in wanted if w[:2].lower() in LANGUAGES), "en"))
-
-
-def typeset(text: str) -> str:
-    """What the core writes for every console, as a page has it: signs, and no break before a unit."""
-    for plain, sign in (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ")):
-        text = text.replace(plain, sign)
-    return re.sub(r"(\d) us\b", rf"\1{NBSP}µs", re.sub(r"(\d) ?%", rf"\1{NBSP}%", text))
 
 
 def told(refusal: Refusal, texts: Texts) -> Refusal:

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from commissioner.motor.circuit import QUANTILE
 from commissioner.report.sheet.marks import capitalised
-from commissioner.service.page.texts import NBSP, Texts, typeset
+from commissioner.report.sheet.words import NBSP, UNITS, check_name, spoken
+from commissioner.service.page.texts import Texts
 
 SCRIPT_TEXTS = (
     "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
@@ -50,12 +51,6 @@ QUANTITIES = (
     ),
     Quantity("rotor_time_constant_s", "T<sub>R</sub>", "rotor time constant", 1e3, "ms", 1, ""),
 )
-UNITS: Mapping[str, tuple[str, int]] = {
-    "DC link in range": ("V", 1), "heatsink temperature": ("°C", 0), "winding temperature": ("°C", 0),
-    "drive rated for the test current": ("A", 2), "rated power in the drive": ("W", 0), "rated voltage in the drive": ("V", 0),
-    "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
-    "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
-}  # fmt: skip
 
 
 def _named(text: str) -> str:
@@ -63,18 +58,6 @@ def _named(text: str) -> str:
     for quantity in QUANTITIES:
         text = text.replace(quantity.key, quantity.name)
     return text
-
-
-def _plain(check: str) -> str:
-    """A check's name without the units in it."""
-    plain = re.sub(r", deg[A-Z]$", "", check)
-    return re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-
-
-def with_symbols(text: str) -> Markup:
-    """`L_M` as it is set; everything else escaped."""
-    marked = re.sub(r"\b([RLT])_(s|R|M|sigma)\b", r"\1<sub>\2</sub>", str(escape(text)))
-    return Markup(marked.replace("<sub>sigma</sub>", "<sub>σ</sub>"))
 
 
 class Words:
@@ -87,7 +70,7 @@ class Words:
 
     def check_name(self, name: str) -> str:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
-        return capitalised(self._t.tell(_plain(name)))
+        return capitalised(self._t.tell(check_name(name)))
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -112,7 +95,7 @@ class Words:
     def sentence(self, text: object) -> str:
         """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
         plain = _named(str(text))
-        said = with_symbols(typeset(capitalised(self._t.tell(plain))))
+        said = spoken(capitalised(self._t.tell(plain)))
         return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:
@@ -141,7 +124,7 @@ class Words:
         return self._t.with_error(value, QUANTILE * std, unit)
 
     def _unit(self, check: Mapping[str, Any]) -> tuple[str, int]:
-        return UNITS.get(_plain(str(check["name"])), ("", 1))
+        return UNITS.get(check_name(str(check["name"])), ("", 1))
 
     def _localised(self, text: str) -> str:
         """`at most 120 degC` with marks, units and no-break spaces of the language."""

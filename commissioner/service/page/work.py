@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import ValidationError
 
 from commissioner.report.sheet.marks import capitalised
+from commissioner.report.sheet.words import typeset
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -22,7 +23,7 @@ from commissioner.service.library import PLATE_FIELDS, SIMULATOR, Drive, Motor, 
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
 from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
-from commissioner.service.page.texts import UNIT_SIGNS, Texts, texts_of, typeset
+from commissioner.service.page.texts import UNIT_SIGNS, Texts, texts_of
 from commissioner.service.page.tuning import call_of, tuned_page, tuning_of, tuning_page
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal

@@ -112,7 +112,7 @@ def test_a_sentence_has_the_interval_that_every_page_has():
     trend = motor_trends(runs).trends[0]
     (step,) = trend.steps
     said = next(text for text in motor_trends(runs).sentences if "has moved" in text)
-    assert f"± {196.0 * step.relative_std:.1g} %" in said
+    assert f"± {196.0 * step.relative_std:.2f} %" in said  # two digits, and as many of the change
 
 
 def combined_of():

@@ -143,3 +143,7 @@ def test_a_delay_at_its_upper_bound_asks_for_other_rows_though_its_error_is_as_l
     assert late * T + found.batch.delay.value == pytest.approx(4.4 * T)
     with pytest.raises(DataRefused, match="answers too late"):
         require_near(TimeShift(late, late * T + found.batch.delay.value, 0.0, T))
+
+
+def test_a_delay_is_told_with_its_95_percent_interval():
+    assert "+12.72 +- 0.7 us" in TimeShift(0, 12.72e-6, 0.356e-6, T).sentence

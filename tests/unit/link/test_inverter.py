@@ -92,6 +92,7 @@ def test_status_names_state_interlocks_and_trip(bench):
     status = bench.inverter.read_status()
     assert (status.state, status.is_energised, status.fault_text) == ("fault", False, "over-current")
     assert (status.trip_text, status.trip_value, status.trip_limit) == ("over-current", 9.5, 8.0)
+    assert status.trip_unit == "A"
     assert [name for name, holds in status.interlocks.items() if not holds] == ["sto_released"]
     assert np.isnan(status.winding_degc)
 

@@ -144,6 +144,7 @@ def test_a_run_that_ended_early_names_step_value_limit_and_remedy(outcome, title
         "step": "flux guard",
         "value": 0.884,
         "limit": 0.877,
+        "unit": "Wb",
         "remedy": "compare the connection with the plate",
     }
     bare = result(outcome, written=False, error=error, parameters={}, reason="the flux reached its limit")
@@ -151,8 +152,108 @@ def test_a_run_that_ended_early_names_step_value_limit_and_remedy(outcome, title
         del bare[name]
     text = words(first_page(bare)[0])
     assert title in text
-    for told in ("flux guard", "0.884", "0.877", "Compare the connection with the plate."):
+    for told in ("flux guard", "0.884 Wb", "0.877 Wb", "Compare the connection with the plate."):
         assert told in text
+
+
+def test_a_value_beyond_its_limit_is_never_shown_as_the_limit():
+    error = {"what": "the axis was energised too long", "step": "watch", "value": 16.02, "limit": 16.0, "unit": "s"}
+    text = words(first_page(result("aborted", written=False, error=error | {"remedy": ""}, parameters={}))[0])
+    assert "16.02 s" in text
+    assert "16.00 s" in text
+
+
+def test_a_check_has_no_key_and_a_unit_on_both_sides():
+    checks = [
+        ("rated_power_w in the drive", 2200.0, "2200 within 5%", "rated power in the drive 2200 W 2200 W within 5 %"),
+        ("heatsink temperature, degC", 32.0, "at most 85 °C", "heatsink temperature 32.0 °C at most 85 °C"),
+        ("drive rated for the test current", 9.899, "at least 6.36 A peak", "9.90 A at least 6.36 A peak"),
+        ("pole_pairs in the drive", 2, "2 within 5%", "pole pairs in the drive 2 2 within 5 %"),
+    ]
+    rows = [{"name": n, "has_passed": True, "value": v, "limit": w, "remedy": ""} for n, v, w, _ in checks]
+    text = words(run_page(result(checks=rows), JOURNAL, Findings())).replace("\u00a0", " ")
+    for *_, told in checks:
+        assert told in text
+    assert "32.0 °C" in words(first_page(result(checks=rows))[0])
+
+
+def test_what_the_estimator_says_is_set_with_symbols_and_no_parameters_key_reaches_the_page():
+    journal = [*JOURNAL, line("run_ended", {"outcome": "rejected", "reason": "rotor_resistance_ohm is too uncertain"})]
+    remark = "the currents lie +12.0 +- 0.7 us behind; L_M holds at 75% of L_sigma"
+    rejected = result("rejected", written=False, remarks=[remark], reason="rotor_resistance_ohm is too uncertain")
+    page = run_page(rejected, journal, Findings())
+    assert "The currents lie +12.0 ± 0.7\u00a0µs behind; L<sub>M</sub> holds at 75\u00a0% of L<sub>σ</sub>." in page
+    assert "R<sub>R</sub> is too uncertain. The drive is as it was found." in page
+    assert "resistance_ohm" not in page
+
+
+def test_the_procedures_numbers_have_their_units():
+    plan = PLAN | {"acceptance": PLAN["acceptance"] | {"strict": False}}
+    journal = [JOURNAL[0], line("job", {"plan": plan, "nameplate": PLATE}), *JOURNAL[2:]]
+    text = words(run_page(result(), journal, Findings()))
+    for told in (
+        "watchdog_s 0.5 s",
+        "seconds 4.6 s",
+        "flux_fraction 0.9 of rated",
+        "axis_spread_percent 6 %",
+        "strict no",
+    ):
+        assert told in text, told
+    assert "leakage_std_percent 2 % (± 3.9 % here)" in text
+
+
+def test_a_finding_has_the_95_percent_interval_that_every_page_promises_and_its_digits():
+    found = {"cause": "sensor_gain", "sentence": "sensors differ", "relative_size": 0.14231, "relative_std": 0.00017}
+    page = run_page(result(findings=[found]), JOURNAL, Findings())
+    assert "Sensors differ, by 14.231 ± 0.033\u00a0%." in page  # 1.96 x 0.017 %
+
+
+def test_one_value_is_one_value_and_a_guard_that_acted_is_not_hidden():
+    document = result(flux_guard={"peak_fraction": 1.0, "limit_wb": 0.877, "acted": True})
+    document["written"] = document["written"][:1]
+    text = words(first_page(document)[0])
+    assert "Commissioned: one value accepted, written and read back" in text
+    assert "no limit was reached" not in text
+    assert "the flux guard took the amplitude back" in text
+
+
+def test_a_long_tag_never_runs_over_its_neighbours_in_the_margin():
+    tag = "Kühlwasserpumpe Halle 12 Süd, Reserveaggregat mit langer Bezeichnung"
+    first, page = first_page(result(), request={"origin": {"motor_tag": tag}})
+    margin = re.search(r'@top-left { content: "([^"]*)" }', page).group(1)
+    assert len(margin) <= 54
+    assert margin.endswith("…")
+    assert tag in words(first)
+
+
+def test_a_change_a_year_has_the_places_of_its_interval():
+    page = run_page(result(), JOURNAL, Findings(), years=history(40))
+    changes = re.findall(r'data-l="Change a year">([^<>]*) ± ([^<>]*) %<', page)
+    assert len(changes) == 4
+    for value, half in changes:
+        assert len(value.partition(".")[2]) == len(half.partition(".")[2]), (value, half)
+
+
+TUNED = {
+    "name": "motor_r1", "unit": "mohm", "before": 3200.0, "values": [3716.0, 3720.0], "median": 3718.0, "spread_percent": 0.11,
+    "trend_percent": 0.1, "change_percent": 16.2, "field": "stator_resistance_ohm", "ours": 3.718, "conversion": "per phase",
+    "plate_low": 0.5, "plate_high": 12.0, "earlier": [],
+}  # fmt: skip
+
+
+def test_a_tuned_result_has_its_unit_in_every_column():
+    tune = {"in_the_drive": "the best repeat", "repeats": [{}], "form": "standstill", "rows": [TUNED]}
+    error = {
+        "what": "stopped",
+        "step": "tune",
+        "value": 15.200000762939453,
+        "limit": 14.0,
+        "unit": "A",
+        "remedy": "look",
+    }
+    text = words(run_page(result("faulted", written=False, tune=tune, error=error), JOURNAL, Findings()))
+    for told in ("3200.0 mohm", "3716.0, 3720.0 mohm", "3.718 Ω (per phase)", "0.5 ... 12 Ω", "15.2 A", "one time"):
+        assert told in text, told
 
 
 def test_a_fault_after_writing_says_how_to_get_the_old_values_back():
@@ -222,7 +323,7 @@ def test_a_motor_with_earlier_runs_has_them_drawn_with_what_moved():
     page = run_page(result(), JOURNAL, Findings(), years=history(8))
     text = words(page)
     assert "8 runs of this motor, at a stator flux of 0.716 Wb and 24.0 °C" in text
-    assert "Rotor resistance has moved by +8 ±" in text
+    assert re.search(r"Rotor resistance has moved by \+8\.0+ ± 0\.0*[1-9]\d % from", text)
     assert page.count('aria-label="rotor resistance over 8 runs, in Ω"') == 1
     assert "2.354 ±" in text
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from markupsafe import Markup
 
+from commissioner.report import page
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
 from commissioner.report.sheet.drawing import Panel, envelope, padded, ticks
@@ -111,3 +112,13 @@ def test_nothing_is_loaded_from_elsewhere():
         if source.startswith(("data", "h", "/"))
     )
     assert 'counter(page) " of " counter(pages)' in text
+
+
+def test_a_printed_card_breaks_between_its_figures_and_no_heading_stands_alone():
+    """A section that may not break leaves most of the page before it blank."""
+    text = page.render(page.Page("t", "h", "plain", [], [page.Section("s", page.Table(("a",), [("1",)]))]))
+    printed = text[text.index("@media print") :].partition("</style>")[0]
+    assert "header,figure,tr { break-inside:avoid }" in printed
+    assert "h2,thead { break-after:avoid }" in printed
+    assert "section { break-inside" not in printed
+    assert '<th scope="col">a</th>' in text

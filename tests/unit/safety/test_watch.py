@@ -153,3 +153,12 @@ def test_a_reason_ends_the_run_as_what_it_is(is_fault, kind):
 
 def test_no_reason_ends_nothing():
     stop_if(None)
+
+
+def test_a_number_that_stopped_the_test_has_its_unit_in_the_error():
+    hot = replace(STATUS, heatsink_degc=91.0)
+    tripped = replace(STATUS, fault_code=1, trip_value=15.2, trip_limit=14.0, trip_unit="A")
+    for status, kind, unit in ((hot, Aborted, "°C"), (tripped, DriveFault, "A")):
+        with pytest.raises(kind) as caught:
+            stop_if(judge_status(status, LIMITS))
+        assert caught.value.as_dict()["unit"] == unit

@@ -2,7 +2,8 @@
 
 import pytest
 
-from commissioner.service.page.texts import NBSP, Texts
+from commissioner.report.sheet.words import NBSP
+from commissioner.service.page.texts import Texts
 from commissioner.service.page.words import Words
 
 

@@ -1,0 +1,69 @@
+"""What the core writes for every console, as a page sets it: names without keys, symbols, signs, numbers in their units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from markupsafe import Markup, escape
+
+from commissioner.motor.quantities import FIVE
+from commissioner.report.sheet.numbers import digits
+from commissioner.text import in_unit
+
+NBSP = "\u00a0"
+UNITS: Mapping[str, tuple[str, int]] = {
+    "DC link in range": ("V", 1), "heatsink temperature": ("°C", 0), "winding temperature": ("°C", 0),
+    "drive rated for the test current": ("A", 2), "rated power in the drive": ("W", 0), "rated voltage in the drive": ("V", 0),
+    "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
+    "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
+}  # fmt: skip
+"""Of what a check sees, by the check's plain name; and its decimals."""
+_SIGNS = (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ"))
+_MOST_DIGITS = 9
+
+
+def check_name(check: str) -> str:
+    """`rated_power_w in the drive` -> `rated power in the drive`: no key, and no unit in the name."""
+    plain = re.sub(r", deg[A-Z]$", "", check)
+    return re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
+
+
+def check_unit(check: str) -> str:
+    return UNITS.get(check_name(check), ("", 0))[0]
+
+
+def typeset(text: str) -> str:
+    """Signs, and no break before a unit."""
+    for plain, sign in _SIGNS:
+        text = text.replace(plain, sign)
+    return re.sub(r"(\d) us\b", rf"\1{NBSP}µs", re.sub(r"(\d) ?%", rf"\1{NBSP}%", text))
+
+
+def with_symbols(text: str) -> Markup:
+    """`L_M` as it is set; everything else escaped."""
+    marked = re.sub(r"\b([RLT])_(sigma|σ|s|R|M|r)\b", r"\1<sub>\2</sub>", str(escape(text)))
+    return Markup(marked.replace("<sub>sigma</sub>", "<sub>σ</sub>"))
+
+
+def spoken(text: str) -> Markup:
+    """A sentence of the core as a page has it: signs and symbols, no key of a parameter."""
+    for quantity in FIVE:
+        text = text.replace(quantity.field, quantity.symbol or quantity.words)
+    return with_symbols(typeset(text))
+
+
+def seen_and_limit(facts: Mapping[str, Any], unit: str = "") -> tuple[str, str]:
+    """What was seen and what was allowed; two numbers have as many digits, three at least, as tell them apart."""
+    value, limit = facts.get("value"), facts.get("limit")
+    count = 3
+    while count < _MOST_DIGITS and value != limit and _shown(value, count) == _shown(limit, count):
+        count += 1
+    return in_unit(_shown(value, count), value, unit), in_unit(_shown(limit, count), limit, unit)
+
+
+def _shown(value: object, count: int) -> str:
+    if value is None or value == "":
+        return "—"
+    return digits(value, count) if isinstance(value, float) else typeset(str(value))
