@@ -385,8 +385,12 @@ class ModbusPort:
             )
         if isinstance(self._url, RtuUrl):
             line = f"{self._url.baud} Bd, parity {self._url.parity}, {self._url.stop_bits} stop"
-            return f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
-        return f"check the drive's supply, the cable, and that device={self._device} is its number behind this address"
+            where = f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
+        else:
+            where = (
+                f"check the drive's supply, the cable, and that device={self._device} is its number behind this address"
+            )
+        return f"{where}; an answer that needs longer gets it by reply=SECONDS in the address"
 
     def _refused(self, what: str, code: int) -> NoReturn:
         self.stats.refusals += 1
