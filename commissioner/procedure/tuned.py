@@ -17,7 +17,7 @@ from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.motor.quantities import in_shown_unit
 from commissioner.procedure.verdict import Objection
 from commissioner.registers.convention import our_values
-from commissioner.registers.profile import DriveProfile
+from commissioner.registers.profile import DriveProfile, Item
 
 SPREAD_PERCENT = 5.0
 """Largest minus smallest, of the median: a drive's own repeats differ by 1 ... 3 %; one that is wrong once by far more."""
@@ -94,6 +94,13 @@ def judge_tunings(
     )
 
 
+def _unsaid(item: Item) -> str:
+    """Why a value is compared with itself alone."""
+    if not item.convention:
+        return "as the drive counts: no source tells its unit"
+    return "as the drive means it: alone it is no value of the inverse-Gamma circuit"
+
+
 def _row(
     profile: DriveProfile,
     name: str,
@@ -118,7 +125,7 @@ def _row(
         change_percent=100 * (median / old - 1) if old else None,
         field=ours.field if ours else None,
         ours=ours.value if ours else None,
-        conversion=ours.conversion if ours else "as the drive counts: no source tells its unit",
+        conversion=ours.conversion if ours else _unsaid(profile.item(name)),
         plate_low=low,
         plate_high=high,
         earlier=tuple(earlier.get(ours.field, ())) if ours else (),

@@ -20,6 +20,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Protocol
 
 from commissioner.errors import UsageError
 from commissioner.motor.circuit import Gamma as GammaCircuit
@@ -53,6 +54,17 @@ UNITS = frozenset(
 )
 """What an item's `unit` may say. `raw`: as the drive counts, where no source tells the unit; it can be compared and restored,
 never converted."""
+
+
+class Rated(Protocol):
+    """A motor's rated values, as far as they are known: a nameplate's, or those of a document's example."""
+
+    @property
+    def rated_voltage_v(self) -> float | None: ...
+    @property
+    def rated_current_a(self) -> float | None: ...
+    @property
+    def rated_frequency_hz(self) -> float | None: ...
 
 
 @dataclass(frozen=True)
@@ -97,8 +109,14 @@ def drive_value(item: Item, circuit: InverseGamma, nameplate: Nameplate | None =
             limit=", ".join(sorted(known)) or ", ".join(CONVENTIONS),
             remedy="give the item a quantity and a convention that belong together",
         )
-    factor = 1.0 if quantity == "rotor_time_constant" else representation_factor(quantity, form, nameplate)
-    return known[quantity] * factor
+    return known[quantity] * representation_factor(quantity, form, nameplate)
+
+
+def per_phase_value(item: Item, value: float, rated: Rated | None) -> float:
+    """The value of an item with a convention, per phase and in SI, in the circuit that the drive means. Raises UsageError as
+    `representation_factor`."""
+    form = CONVENTIONS[item.convention][1]
+    return value / representation_factor(item.quantity or item.name, form, rated)
 
 
 def parameter_limits(profile: DriveProfile, plate: Nameplate) -> dict[str, tuple[float, float]]:
@@ -130,7 +148,7 @@ def unit_of(quantity: str, convention: str) -> str | None:
 def our_values(profile: DriveProfile, held: Mapping[str, float], nameplate: Nameplate | None) -> dict[str, Ours]:
     """Each held value that can be said in the service's own terms (inverse-Gamma, per phase, SI), by item name.
 
-    Values of a T or Gamma circuit need the whole of it; R_s and T_r stand alone in every circuit. What has no convention,
+    Values of a T or Gamma circuit need the whole of it; R_s, the same in every circuit, and T_r stand alone. What has no convention,
     or needs a nameplate where there is none, is left out.
     """
     per_phase: dict[str, dict[str, tuple[str, float]]] = {}
@@ -142,21 +160,25 @@ def our_values(profile: DriveProfile, held: Mapping[str, float], nameplate: Name
             continue
         quantity = item.quantity or item.name
         try:
-            factor = 1.0 if quantity == "rotor_time_constant" else representation_factor(quantity, form, nameplate)
+            factor = representation_factor(quantity, form, nameplate)
         except UsageError:
             continue
         per_phase.setdefault(model, {})[quantity] = (name, value / factor)
         if quantity in _ALONE or (model == "inverse_gamma" and quantity in _FIELDS):
             words = "as it stands" if factor == 1.0 else f"{form.replace('_', ' ')}: divided by {factor:.6g}"
             out[name] = Ours(_FIELDS[quantity], value / factor, words)
+    found = [pair for circuit in per_phase.values() for pair in circuit.items()]
+    stator = {quantity: pair for quantity, pair in found if quantity == "stator_resistance"}
     for model in ("t", "gamma"):
-        out |= _whole_circuit(model, per_phase.get(model, {}))
+        out |= _whole_circuit(model, stator | per_phase.get(model, {}))
     return out
 
 
 def _whole_circuit(model: str, found: Mapping[str, tuple[str, float]]) -> dict[str, Ours]:
     """The inverse-Gamma values of a complete T or Gamma set; empty where a part is missing."""
     needed = _SETS[model]
+    if model == "gamma" and "magnetizing_inductance" in found:
+        found = {"stator_inductance": found["magnetizing_inductance"], **found}
     if not all(quantity in found for quantity in needed):
         return {}
     values = [found[quantity][1] for quantity in needed]
@@ -179,24 +201,36 @@ def _whole_circuit(model: str, found: Mapping[str, tuple[str, float]]) -> dict[s
     }
 
 
-def representation_factor(quantity: str, form: str, nameplate: Nameplate | None) -> float:
+def representation_factor(quantity: str, form: str, rated: Rated | None) -> float:
     """What a per-phase SI value is multiplied by: 2 line to line, omega_N, 100/Z_N or 100 omega_N/Z_N.
 
-    omega_N = 2 pi f_N, Z_N = U_N/(sqrt(3) I_N). Raises UsageError where it needs a nameplate and there is none.
+    omega_N = 2 pi f_N, Z_N = U_N/(sqrt(3) I_N). Raises UsageError naming what of them it needs and is not known.
     """
-    if form in ("per_phase", "line_to_line"):
-        return 2.0 if form == "line_to_line" else 1.0
-    if nameplate is None:
+    if quantity == "rotor_time_constant" or form == "per_phase":
+        return 1.0
+    if form == "line_to_line":
+        return 2.0
+    factor = 1.0
+    if form == "percent_of_base_impedance":
+        voltage_v, current_a = _known(rated, quantity, form, "rated_voltage_v", "rated_current_a")
+        factor = 100 / (voltage_v / (math.sqrt(3) * current_a))
+    if quantity in INDUCTANCES:
+        (frequency_hz,) = _known(rated, quantity, form, "rated_frequency_hz")
+        factor *= 2 * math.pi * frequency_hz
+    return factor
+
+
+def _known(rated: Rated | None, quantity: str, form: str, *names: str) -> list[float]:
+    values = [getattr(rated, name, None) for name in names]
+    if None in values:
         raise UsageError(
             f"the drive wants {quantity} as {form.replace('_', ' ')}",
             step="convert to the drive's convention",
             value="no nameplate",
-            limit="rated voltage, current and frequency",
+            limit=" and ".join(names),
             remedy="name the motor with --motor",
         )
-    omega = 2 * math.pi * nameplate.rated_frequency_hz if quantity in INDUCTANCES else 1.0
-    impedance_ohm = nameplate.rated_voltage_v / (math.sqrt(3) * nameplate.rated_current_a)
-    return omega * (100 / impedance_ohm if form == "percent_of_base_impedance" else 1.0)
+    return [float(value) for value in values if value is not None]
 
 
 def _inverse_gamma(circuit: InverseGamma) -> dict[str, float]:

@@ -256,8 +256,9 @@ class Mailbox:
 
 @dataclass(frozen=True)
 class Worked:
-    """An example from the cited document: these words on the wire are this value, which is so much per phase in SI; to
-    write it through the mailbox `request` goes out."""
+    """An example from the cited document: these words on the wire are this value, which is so much per phase in SI, in the
+    circuit of the item's convention; a reactance or per cent is so of the example's rated motor. To write it through the
+    mailbox `request` goes out."""
 
     item: str
     source: str
@@ -265,6 +266,9 @@ class Worked:
     words: tuple[int, ...] = ()
     value: float | None = None
     per_phase: float | None = None
+    rated_voltage_v: float | None = None
+    rated_current_a: float | None = None
+    rated_frequency_hz: float | None = None
     request: tuple[int, ...] = ()
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from commissioner.errors import ConfigurationError, ReplyMismatch, UsageError
 from commissioner.registers.codec import decode_item, encode_item
-from commissioner.registers.convention import our_values
+from commissioner.registers.convention import CONVENTIONS, per_phase_value
 from commissioner.registers.mailbox import request
-from commissioner.registers.profile import DriveProfile, Worked
+from commissioner.registers.profile import DriveProfile, Item, Worked
 
 DIGITS = 12
 """Compared after rounding to so many significant digits: scales like 0.0001 have no exact binary form."""
@@ -63,8 +63,18 @@ def _compared(profile: DriveProfile, example: Worked, index: int) -> Iterator[tu
     if example.request:
         yield "request", _as_written(profile, example), example.request
     if example.per_phase is not None and example.value is not None:
-        ours = our_values(profile, {example.item: example.value}, None).get(example.item)
-        yield "per_phase", ours.value if ours else None, example.per_phase
+        yield "per_phase", _per_phase(profile, item, example, f"worked[{index}].per_phase"), example.per_phase
+
+
+def _per_phase(profile: DriveProfile, item: Item, example: Worked, key: str) -> float:
+    assert example.value is not None
+    try:
+        if item.convention in CONVENTIONS:
+            return per_phase_value(item, example.value, example)
+        expected = "left out where the item has no convention"
+    except UsageError as error:
+        expected = f"beside {error.limit} of the document's motor"
+    raise ConfigurationError(file=profile.file, key=key, value=example.per_phase, expected=expected)
 
 
 def _as_written(profile: DriveProfile, example: Worked) -> tuple[int, ...] | None:

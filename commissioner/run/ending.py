@@ -46,7 +46,7 @@ def taken_as_live(state: str) -> DriveFault:
 
 def still_live(live: DriveFault, error: CommissionerError | None) -> CommissionerError:
     """What ended the run, as the fault that it is while the drive does not confirm that its output is off."""
-    if error is None or error is live:
+    if error is None or error.what == live.what:
         return live
     if error.outcome != live.outcome:
         live.what = f"{error.what}; {live.what}"

@@ -262,13 +262,15 @@ class Runner:
         assert self._stream is not None
         inverter, progress = self._inverter, self._progress
         began_s = inverter.now_s()
+        every_s = min(STATUS_EVERY_S, 0.3 * (progress.facts.watchdog_s or 0.0))
         while True:
+            asked_s = inverter.now_s()
             status = self._stream.ask_status()
             left_s = began_s + seconds - inverter.now_s()
             if left_s <= 0.0 or not status.is_energised:
                 break
             inverter.beat()
-            inverter.sleep(max(0.0, min(STATUS_EVERY_S, 0.3 * (progress.facts.watchdog_s or 0.0), left_s)))
+            inverter.sleep(max(0.0, min(every_s - (inverter.now_s() - asked_s), left_s)))
         inverter.beat()
         passed_s = inverter.now_s() - began_s
         progress.session_s += passed_s

@@ -124,9 +124,10 @@ def _result(document: Mapping[str, Any]) -> None:
     screen.result(document)
     rows = (document.get("tune") or {}).get("rows") or ()
     if rows:
-        header = ("result", "before", "median", "spread", "trend", "change", "per phase, SI", "plate allows")
+        header = ("result", "before", "median", "spread", "trend", "change")
         screen.out.print(screen.table("", header, [_row(row) for row in rows], right=(1, 2, 3, 4, 5)))
         for row in rows:
+            screen.out.print(f"  [dim]•[/] {row['name']}: {screen.text(_said(row))}")
             for earlier in row["earlier"][:3]:
                 screen.out.print(
                     f"  [dim]•[/] {row['name']}: {100 * (row['ours'] / earlier['value'] - 1):+.1f} % to run {earlier['run']}"
@@ -137,7 +138,6 @@ def _result(document: Mapping[str, Any]) -> None:
 
 
 def _row(row: Mapping[str, Any]) -> Sequence[str]:
-    known = row["ours"] is not None
     return (
         row["name"],
         f"{row['before']:.6g}",
@@ -145,6 +145,12 @@ def _row(row: Mapping[str, Any]) -> Sequence[str]:
         f"{row['spread_percent']:.2g} %",
         f"{row['trend_percent']:+.2g} %",
         "" if row["change_percent"] is None else f"{row['change_percent']:+.1f} %",
-        f"{row['ours']:.5g} ({row['conversion']})" if known else row["conversion"],
-        f"{row['plate_low']:.3g} ... {row['plate_high']:.3g}" if known else "not judged",
     )
+
+
+def _said(row: Mapping[str, Any]) -> str:
+    """The median in the service's own terms, and what the plate allows."""
+    if row["ours"] is None:
+        return str(row["conversion"])
+    allowed = f"{row['plate_low']:.3g} ... {row['plate_high']:.3g}"
+    return f"{row['ours']:.5g} per phase, SI ({row['conversion']}); the plate allows {allowed}"

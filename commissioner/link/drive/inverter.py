@@ -202,6 +202,7 @@ class Inverter:
                 limit="a session number that differs from the one before",
                 remedy="check the drive's firmware",
             )
+        self.beat()  # over a slow link the requests since the start have used up most of the watchdog's time
         return StreamCursor(stream(session))
 
     def energising(self) -> Intent:

@@ -15,6 +15,7 @@ Count = Annotated[int, Field(ge=1, le=125)]
 Seconds = Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)]
 Pair = Annotated[list[Word], Field(min_length=2, max_length=2)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Above = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Capability = Literal["excite", "stream", "write_back", "restore"]
 HeaderField = Literal[
     "session_id:u16", "first_index:u32", "count:u16", "channel_mask:u16", "flags:u16", "dc_link_raw:i16", "crc16:u16"
@@ -150,6 +151,9 @@ class WorkedTable(Table):
     words: list[Word] = []
     value: Finite | None = None
     per_phase: Finite | None = None
+    rated_voltage_v: Above | None = None
+    rated_current_a: Above | None = None
+    rated_frequency_hz: Above | None = None
     request: list[Word] = []
 
 

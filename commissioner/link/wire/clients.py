@@ -39,6 +39,8 @@ class _Deadline(ModbusTcpClient):
 
     _end = 0.0
     _asked, _units = 0, frozenset[int]()
+    received = bytearray()
+    """As of a serial line."""
 
     def other_device(self) -> int | None:
         """The device whose answer came since the last request was sent, where it was not the one that was asked."""
@@ -46,7 +48,7 @@ class _Deadline(ModbusTcpClient):
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
         wanted = self.comm_params.timeout_connect
-        self._asked, self._units = request[UNIT], frozenset()
+        self._asked, self._units, self.received = request[UNIT], frozenset(), bytearray()
         self._end = time.monotonic() + wanted
         if self.socket is None:
             raise ConnectionException("the connection is closed")  # type: ignore[no-untyped-call]
@@ -69,6 +71,7 @@ class _Deadline(ModbusTcpClient):
         if not data:
             self.close()  # type: ignore[no-untyped-call]
             raise ConnectionException("the other end closed the connection")  # type: ignore[no-untyped-call]
+        self.received += data
         if len(data) > UNIT and data[2:4] == b"\0\0":
             self._units |= {data[UNIT]}
         return data

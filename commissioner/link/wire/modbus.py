@@ -372,8 +372,8 @@ class ModbusPort:
         other = self._client.other_device()
         if other is not None:
             return f"an answer of device {other}"
-        if isinstance(self._client, SerialClient) and self._client.received:
-            return f"{len(self._client.received)} bytes that are no Modbus answer"
+        if self._client.received:
+            return f"{len(self._client.received)} bytes that are no Modbus answer to it"
         return f"nothing in {self.reply_timeout_s:g} s"
 
     def _remedy(self) -> str:
@@ -385,8 +385,15 @@ class ModbusPort:
             )
         if isinstance(self._url, RtuUrl):
             line = f"{self._url.baud} Bd, parity {self._url.parity}, {self._url.stop_bits} stop"
-            return f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
-        return f"check the drive's supply, the cable, and that device={self._device} is its number behind this address"
+            where = f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
+        else:
+            wrong_port = (
+                "see that Modbus TCP, and nothing else, answers on this port; " if self._client.received else ""
+            )
+            where = (
+                f"{wrong_port}check the drive's supply, the cable, and that device={self._device} is its number there"
+            )
+        return f"{where}; an answer that needs longer gets it by reply=SECONDS in the address"
 
     def _refused(self, what: str, code: int) -> NoReturn:
         self.stats.refusals += 1

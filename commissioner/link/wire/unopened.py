@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import socket
+import ssl
 from pathlib import Path
 
 from commissioner.errors import LinkUnreachable
@@ -12,6 +13,8 @@ from commissioner.link.wire.url import DriveUrl, RtuUrl
 NOT_OURS = frozenset({errno.EACCES, errno.EPERM, errno.EBUSY, errno.EAGAIN})
 """The port is there and this user may not open it, or another program holds it."""
 NO_SERIAL_PORT = frozenset({errno.ENOTTY, errno.ENODEV, errno.EISDIR})
+HANDSHAKE = "handshake operation timed out"
+"""What Python's ssl says within a TimeoutError: something listens there and does not speak TLS."""
 PARITIES = {"N": "no parity", "E": "even parity", "O": "odd parity"}
 
 
@@ -24,6 +27,10 @@ def unopened(url: DriveUrl, error: Exception, limit: str) -> LinkUnreachable:
 
 
 def _of_network(error: Exception) -> str:
+    if isinstance(error, ssl.SSLCertVerificationError):
+        return "its certificate is not accepted: give its authority's PEM file as ca=FILE, and the host by a name that is in the certificate"
+    if isinstance(error, ssl.SSLError) or HANDSHAKE in str(error):
+        return "what listens there does not take our TLS: check the port and cert= and key=; without TLS it is tcp://HOST:PORT"
     if isinstance(error, socket.gaierror):
         return "this name is not known here: give the drive's number, as tcp://192.168.0.20:502"
     if isinstance(error, ConnectionRefusedError):

@@ -87,6 +87,18 @@ def test_a_whole_session_comes_over_the_wire_without_a_hole(wire):
     assert cursor.next_index * blocks[0].sample_period_s == pytest.approx(0.5, abs=0.2)
 
 
+def test_an_enabled_drive_has_heard_of_us_again_before_anything_else_is_asked_of_it():
+    """Over a link of 150 ms a request the watchdog of 0.6 s ended the first session before its amplitude was set."""
+    with SimProcess(*WIRES["tcp"]) as sim, connect(sim) as inverter:
+        set_up(inverter)
+        address = inverter.profile.item("heartbeat_echo").address
+        before = inverter.port.read(address, 1)
+        inverter.enable()
+        after = inverter.port.read(address, 1)
+        inverter.disarm()
+    assert after != before
+
+
 def test_the_same_session_is_the_same_samples_over_every_wire():
     """The wire must not touch a bit: same seed, same signal, TCP and RTU."""
     currents = []

@@ -21,6 +21,7 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.operations.check import CheckRequest, check
+from commissioner.registers.convention import our_values
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.job import names_of
 from commissioner.run.restore import restore
@@ -216,6 +217,42 @@ def test_a_drive_that_takes_one_register_at_a_time_cannot_have_a_written_value_o
         variant("danfoss_fc302", link__write_functions=[6])
 
 
+T_CIRCUIT = {
+    "stator_resistance": (1299, 0.001, "ohm", "line_to_line", 7400, 3.7),
+    "rotor_resistance": (1309, 0.001, "ohm", "t_per_phase", 2333, 2.333),
+    "stator_leakage_inductance": (1329, 0.001, "ohm", "t_reactance_at_rated_frequency", 3434, 3.434 / (100 * math.pi)),
+    "rotor_leakage_inductance": (1339, 0.001, "ohm", "t_reactance_at_rated_frequency", 3434, 3.434 / (100 * math.pi)),
+    "magnetizing_inductance": (1349, 0.001, "ohm", "t_reactance_at_rated_frequency", 99767, 99.767 / (100 * math.pi)),
+}
+"""L_s = 0.3285 H: L_m = sqrt(0.307 L_s) = 0.31757 H, each leakage L_s - L_m = 0.01093 H, R_r = L_s/0.307 2.18 ohm, at 100 pi."""
+
+
+def test_a_drive_of_the_t_circuit_and_reactances_is_written_read_back_and_restored():
+    items = {
+        name: {"address": at, "type": "u32", "scale": scale, "unit": unit, "convention": convention, "access": "rw", "source": "made up"}
+        for name, (at, scale, unit, convention, _, _) in T_CIRCUIT.items()
+    }  # fmt: skip
+    worked = [
+        {"item": name, "source": "made up", "words": [*divmod(raw, 1 << 16)], "value": raw * scale, "per_phase": per_phase,
+         "rated_frequency_hz": 50.0}
+        for name, (_, scale, _, _, raw, per_phase) in T_CIRCUIT.items()
+    ]  # fmt: skip
+    changes = {f"items__{name}": table for name, table in items.items()}
+    order = {"order": list(T_CIRCUIT), "settle_s": 0.0}
+    profile = variant("danfoss_fc302", **changes, worked=worked, parameters=order, unknown={}, link__write_pause_s=0.0)
+    held = [word for at, *_ in T_CIRCUIT.values() for word in ("--set", f"{at}=0,5000")]
+    with LibmodbusDrive(*DANFOSS, *held) as drive, inverter(drive, profile) as one:
+        found = one.snapshot()
+        one.write_circuit(NEW, PLATE, found)
+        written = one.snapshot().in_use
+        ours = our_values(profile, written, PLATE)
+        one.restore(found)
+    assert [
+        ours[name].value for name in ("rotor_resistance", "magnetizing_inductance", "stator_leakage_inductance")
+    ] == (pytest.approx([2.18, 0.307, 0.0215], rel=3e-4))
+    assert all(drive.truth["registers"][str(at + 1)] == 5000 for at, *_ in T_CIRCUIT.values())
+
+
 def test_a_value_that_needs_an_enter_is_read_back_after_it():
     with (
         LibmodbusDrive(*YASKAWA, "--enter", "0x900,0x910") as drive,
@@ -262,6 +299,16 @@ def test_a_slow_drive_is_waited_for_as_long_as_its_address_or_file_says(said_by)
     assert time.monotonic() - started > 0.4
 
 
+def test_a_drive_that_answers_too_late_is_told_how_it_gets_longer():
+    with (
+        LibmodbusDrive(*YASKAWA, "--delay", "400") as drive,
+        inverter(drive, load_profile("yaskawa_a1000"), reply_timeout_s=0.1) as yaskawa,
+        pytest.raises(LinkError) as refused,
+    ):
+        yaskawa.read_status()
+    assert "reply=SECONDS" in refused.value.remedy
+
+
 def test_blocks_are_no_longer_than_the_drive_takes():
     profile = variant("danfoss_fc302", link__max_read_registers=2)
     with LibmodbusDrive(*DANFOSS, "--max-read", "2") as drive, inverter(drive, profile) as danfoss:
@@ -300,6 +347,32 @@ def test_a_new_drive_file_holds_what_the_drive_proved_and_nothing_else(tmp_path)
     assert (profile.link.max_read_registers, profile.link.write_functions) == (2, (16,))
     assert profile.capabilities == frozenset() and "write_back" in profile.unknown
     assert drive.truth["registers"]["1219"] == 400
+
+
+@pytest.mark.parametrize("table", [40000, 400000])
+def test_registers_printed_with_their_tables_number_are_found(tmp_path, table):
+    """What is typed wrong is asked again, and a decimal comma is one."""
+    out = tmp_path / "new.toml"
+    lines = (
+        "A drive",
+        "its manual",
+        "y",
+        "P1.01",
+        str(table + 1220),
+        "0",
+        "400",
+        "p. 1",
+        "y",
+        str(table + 1240),
+        "5,0",
+        "p. 1",
+    )
+    with LibmodbusDrive(*DANFOSS) as drive:
+        answer = ask_new(drive, out, *lines, "n", "n", "n", "n")
+    assert answer.exit_code == 0, answer.output
+    assert "P1.01" in answer.output and "the rest is [unknown] in it" in answer.output.replace("\n", " ")
+    items = load_profile(str(out)).items
+    assert (items["rated_voltage_v"].address, items["rated_current_a"].address) == (1219, 1239)
 
 
 def test_labels_that_are_not_in_the_registers_named_make_no_drive_file(tmp_path):

@@ -5,6 +5,7 @@ import struct
 import subprocess
 import sys
 import time
+from contextlib import closing
 from unittest.mock import Mock
 
 import pytest
@@ -206,6 +207,15 @@ def test_an_answer_of_another_device_is_named():
             port.read(100, 1)
         assert "nothing" in str(silent.value.value) and "device=1" in silent.value.remedy
         port.close()
+
+
+def test_a_port_of_something_else_than_modbus_is_told():
+    with TcpDevice(Bank()) as device, closing(connect(device)) as port:
+        device.script = lambda request, frame: [b"HTTP/1.1 400 Bad Request\r\n\r\n"]
+        with pytest.raises(LinkError) as failure:
+            port.read(100, 1)
+    assert failure.value.value == "28 bytes that are no Modbus answer to it"
+    assert "see that Modbus TCP, and nothing else" in failure.value.remedy
 
 
 def test_a_connection_closed_by_the_drive_is_reported_and_reopened_by_the_next_request():

@@ -2,6 +2,7 @@
 
 import errno
 import socket
+import ssl
 from contextlib import closing
 
 import pytest
@@ -67,3 +68,16 @@ def test_each_is_told_in_german_too():
             assert Texts("de").knows(failure.what) and Texts("de").knows(failure.remedy)
     for error in (socket.gaierror(-2, "x"), ConnectionRefusedError(111, "x"), TimeoutError("x")):
         assert Texts("de").knows(unopened(parse_url("tcp://drive:502"), error, "an open line").remedy)
+
+
+@pytest.mark.parametrize(
+    ("error", "remedy"),
+    [
+        (ssl.SSLCertVerificationError("certificate verify failed: self-signed certificate"), "ca=FILE"),
+        (ssl.SSLError("WRONG_VERSION_NUMBER"), "without TLS it is tcp://"),
+        (TimeoutError("_ssl.c:989: The handshake operation timed out"), "without TLS it is tcp://"),
+        (TimeoutError("timed out"), "the drive is powered"),
+    ],
+)
+def test_a_server_that_is_no_tls_or_not_trusted_is_told_from_one_that_is_away(error, remedy):
+    assert remedy in unopened(parse_url("tls://localhost:802"), error, "a connection within 2 s").remedy

@@ -1,13 +1,15 @@
 """The drive's conventions against closed forms: any two circuits must show the terminals the same impedance."""
 
+import dataclasses
 import math
 
 import pytest
 
 from commissioner.errors import UsageError
+from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
-from commissioner.registers.convention import CONVENTIONS, drive_value
+from commissioner.registers.convention import CONVENTIONS, drive_value, our_values
 from commissioner.registers.profile import Item
 
 CIRCUIT = InverseGamma(3.2, 1.8, 0.026, 0.21)
@@ -88,3 +90,27 @@ def test_a_quantity_that_the_circuit_does_not_have_is_refused():
 def test_every_convention_can_say_the_stator_resistance():
     for convention in CONVENTIONS:
         assert value("stator_resistance", convention) > 0
+
+
+@pytest.mark.parametrize("main", ["stator_inductance", "magnetizing_inductance"])
+@pytest.mark.parametrize("stator", ["line_to_line", "t_line_to_line"])
+def test_a_whole_circuit_is_read_back_whatever_its_stator_resistance_is_said_in(main, stator):
+    circuits = {
+        "gamma": {"rotor_resistance": "", "leakage_inductance": "", main: ""},
+        "t": {"rotor_resistance": "", "stator_leakage_inductance": "", "rotor_leakage_inductance": "", "magnetizing_inductance": ""},
+    }  # fmt: skip
+    for circuit, quantities in circuits.items():
+        items = {q: Item(q, 0, "f32", convention=f"{circuit}_per_phase") for q in quantities}
+        items["stator_resistance"] = Item("stator_resistance", 0, "f32", convention=stator)
+        profile = dataclasses.replace(load_profile("danfoss_fc302"), items=items)
+        held = {q: drive_value(item, CIRCUIT, PLATE) for q, item in items.items()}
+        ours = {one.field: one.value for one in our_values(profile, held, PLATE).values()}
+        assert ours == pytest.approx(
+            {
+                "stator_resistance_ohm": CIRCUIT.stator_resistance_ohm,
+                "rotor_resistance_ohm": CIRCUIT.rotor_resistance_ohm,
+                "leakage_inductance_h": CIRCUIT.leakage_inductance_h,
+                "magnetizing_inductance_h": CIRCUIT.magnetizing_inductance_h,
+            },
+            rel=1e-12,
+        )

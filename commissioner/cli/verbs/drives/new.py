@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+import math
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,7 +75,7 @@ def new_drive(url: str, out: Path, *, may_write: bool, as_json: bool) -> None:
         return
     profile = load_profile(str(out))
     screen.out.print(
-        f"[green]{screen.text(str(out))}[/]: {len(profile.items)} items, read and proved; the rest is [unknown] in it"
+        f"[green]{screen.text(str(out))}[/]: {len(profile.items)} items, read and proved; the rest is \\[unknown] in it"
     )
 
 
@@ -83,10 +84,8 @@ def _labels(source: str) -> list[Known]:
     for name, (unit, words) in ASKED.items():
         if not typer.confirm(f"Is the register of the {words} in the manual?", err=True):
             continue
-        printed = typer.prompt(
-            "  its register as printed (decimal, or 0x...)", value_proc=lambda text: int(text, 0), err=True
-        )
-        value = typer.prompt(f"  its value in {unit}", type=float, err=True)
+        printed = typer.prompt("  its register as printed (decimal, or 0x...)", value_proc=_register, err=True)
+        value = typer.prompt(f"  its value in {unit}", value_proc=_label, err=True)
         page = typer.prompt("  page", err=True).strip()
         known.append(Known(name, printed, value, unit, f"{source}, {page}"))
     if len(known) < FEWEST:
@@ -97,13 +96,30 @@ def _labels(source: str) -> list[Known]:
     return known
 
 
+def _register(text: str) -> int:
+    """As printed; leading zeros are no octal number. BadParameter: it is asked again."""
+    try:
+        return int(text, 16 if text.strip().lower().startswith("0x") else 10)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is no register: write it as 1220, 40101 or 0x31A") from None
+
+
+def _label(text: str) -> float:
+    """A value that proves something: zero stands in registers that nobody uses. BadParameter: it is asked again."""
+    with suppress(ValueError):
+        value = float(text.strip().replace(",", "."))
+        if 0.0 < value < math.inf:
+            return value
+    raise typer.BadParameter(f"{text!r} is no value above zero: write it as 400 or 5.1")
+
+
 def _probe(port: ModbusPort, known: list[Known], *, may_write: bool) -> Probed:
     found = [probing.readings(port, label) for label in known]
     for label, readings in zip(known, found, strict=True):
         if not readings:
             raise CheckFailed(
                 f"no reading of register {label.printed} gives {label.value:g} {label.unit}", step="prove the address base",
-                value=label.name, limit="u16, i16, u32 or f32, either word order, at this register or one before, scales of ten",
+                value=label.name, limit="u16, i16, u32 or f32, either word order, counted from 0, from 1 or as 4xxxx, scales of ten",
                 remedy="check register and value; a value on the label may not be set in the drive",
             )  # fmt: skip
     agreed = probing.agreed(found)

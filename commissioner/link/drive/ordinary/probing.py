@@ -21,6 +21,9 @@ SAME = 0.005
 """A label is rounded: so near must a register's value be to it."""
 LONGEST = 125
 FAR = 0xFFF0
+LAST = 0xFFFF
+MODICON = {40001: 49999, 400001: 465536}
+"""First and last holding register where a manual prints the table's 4 before its number, Modbus over serial line's old way."""
 TIMES = 20
 
 
@@ -136,16 +139,21 @@ def answer_times(port: ModbusPort, address: int) -> tuple[float, float]:
 
 def _forms(known: Known) -> Iterator[tuple[Item, int]]:
     base = Item(known.name, known.printed, "u16", unit=known.unit, source=known.source)
-    for shift in (0, -1):
+    for shift in _shifts(known.printed):
         for kind, orders in (
             ("u16", ("big",)),
             ("i16", ("big",)),
             ("u32", ("big", "little")),
             ("f32", ("big", "little")),
         ):
-            if known.printed + shift >= 0:
-                for order in orders:
-                    yield replace(base, address=known.printed + shift, type=kind, word_order=order), shift
+            for order in orders:
+                yield replace(base, address=known.printed + shift, type=kind, word_order=order), shift
+
+
+def _shifts(printed: int) -> list[int]:
+    """From zero, from one, and from one behind the table's 4."""
+    tables = [-first for first, last in MODICON.items() if first <= printed <= last]
+    return [shift for shift in (0, -1, *tables) if 0 <= printed + shift <= LAST]
 
 
 def _answers(port: ModbusPort, address: int, count: int) -> str:
