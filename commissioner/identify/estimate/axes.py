@@ -99,7 +99,10 @@ def _remarks(axes: Sequence[AxisEstimate]) -> tuple[str, ...]:
     orientations = {round(a.axis_deg % 180.0, 3) for a in axes}
     remarks = []
     if len(orientations) < 3:
-        remarks.append(f"{len(orientations)} orientation(s): sensor gain and anisotropy need at least three")
+        remarks.append(
+            f"{len(orientations)} orientation(s): sensor gain and anisotropy need at least three; what the phases or their sensors "
+            "differ by is in the values, and not all of it in the standard errors"
+        )
     if len(orientations) == len(axes) and len(axes) > 1:
         remarks.append("no orientation was repeated: heating cannot be told from differences between axes")
     return tuple(remarks)
