@@ -42,14 +42,14 @@ class Drawn:
     def highest_flux_wb(self) -> float:
         return self.station.highest_flux_wb
 
-    def parameters_at(self, stator_flux_wb: float) -> Mapping[str, float]:
-        """Secant inverse-Gamma values at a peak stator flux, as they are at the drive's terminals and through its sensors: the
-        stator's resistance with that of the devices, and every impedance over the mean gain of the three sensors, for nothing that
+    def parameters_at(self, stator_flux_wb: float, axes_deg: Sequence[float]) -> Mapping[str, float]:
+        """Secant inverse-Gamma values at a peak stator flux, as they are at the drive's terminals and through its sensors along
+        these axes: the stator's resistance with that of the devices, and every impedance over the sensors' gain, for nothing that
         the drive measures tells either apart."""
         plant = self.station.scenario.plant
         secant = inverse_gamma(plant, stator_flux_wb)
         truth = {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
-        gain = sensor_gain(plant)
+        gain = sensor_gain(plant, axes_deg)
         return {name: value / gain for name, value in truth.items()}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,10 +58,12 @@ def apparent_resistance_ohm(plant: Plant) -> float:
     return plant.machine.stator_resistance_ohm + float(p[at.P_SLOPE_OHM])
 
 
-def sensor_gain(plant: Plant) -> float:
-    """Mean of the three current sensors' gains, what was hidden in them included."""
+def sensor_gain(plant: Plant, axes_deg: Sequence[float]) -> float:
+    """By which the three current sensors, what was hidden in them included, scale a current along these axes in the mean: a
+    current along one axis is read by each sensor times the square of its phase's cosine. Of axes all round it is the sensors' mean."""
     _, s = pack(plant)
-    return float(np.mean(s[at.S_GAIN_U : at.S_GAIN_W + 1]))
+    seen = np.cos(np.radians(np.subtract.outer(np.asarray(axes_deg, dtype=float), [0.0, 120.0, 240.0]))) ** 2
+    return float(np.mean(2.0 / 3.0 * seen @ s[at.S_GAIN_U : at.S_GAIN_W + 1]))
 
 
 def _row(plant: Plant, flux_wb: float) -> dict[str, Any]:

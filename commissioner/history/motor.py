@@ -96,7 +96,7 @@ def motor_trends(measured: Sequence[Measured], *, false_alarm: float = FALSE_ALA
         heat = RESISTANCE_PER_K * TEMPERATURE_K * (1.0 if k < 2 else 0.0)
         unknown = np.array([heat if result.winding_degc is None else 0.0 for result in results])
         std = np.sqrt(claimed**2 + REPEATABILITY[k] ** 2 + unknown**2)
-        judged = judge(time / YEAR_S, np.log(value), std, tests=len(PARAMETERS), false_alarm=false_alarm)
+        judged = _judged(time, np.log(value), std, len(PARAMETERS), false_alarm)
         trends.append(_relative(name, measured, value, std, judged))
     sentences = [*said, *_heat_sentences(results, degc)]
     return Trends(
@@ -114,12 +114,16 @@ def indicator_trends(
     trends = []
     for name, rows in series.items():
         time, value, std = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
-        judged = judge(time / YEAR_S, value, np.maximum(std, 1e-12), tests=len(series), false_alarm=false_alarm)
+        judged = _judged(time, value, np.maximum(std, 1e-12), len(series), false_alarm)
         points = tuple(Point(row[0], row[1], row[2], row[3]) for row in rows)
         scale = abs(judged.level) or 1.0
         trends.append(_trend(name, units.get(name, ""), points, (judged.level, judged.level_std), judged, scale))
     ground = CommonGround(None, None, ())
     return Trends(tuple(trends), ground, false_alarm, _words(trends, false_alarm))
+
+
+def _judged(time_s: Array, value: Array, std: Array, tests: int, false_alarm: float) -> Judged:
+    return judge(time_s / YEAR_S, value, std, tests=tests, false_alarm=false_alarm, least_span=LEAST_SPAN_S / YEAR_S)
 
 
 def _relative(name: str, measured: Sequence[Measured], value: Array, std: Array, judged: Judged) -> Trend:
@@ -137,8 +141,6 @@ def _trend(
 ) -> Trend:
     """`scale`: by which what was judged is divided to be relative; None: it was the logarithm."""
     by, slope, alarm = scale or 1.0, judged.slope, judged.alarm
-    if points[-1].time_s - points[0].time_s < LEAST_SPAN_S:
-        slope = None
     steps = (
         Move(points[s.at].run, math.expm1(s.change) if scale is None else s.change / by, s.std / by, s.probability)
         for s in judged.steps

@@ -38,12 +38,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Slope:
-    """Per unit of time, since the last step; `probability`: of so steep a one by chance."""
+    """Per unit of time, since the last step; `probability`: of so steep a one by chance; `rest`: chi-square that it leaves."""
 
     value: float
     std: float
     probability: float
     is_significant: bool
+    rest: float
 
 
 @dataclass(frozen=True)
@@ -70,11 +71,15 @@ class Judged:
     alarm: Alarm | None
 
 
-def judge(time: Array, value: Array, std: Array, *, tests: int = 1, false_alarm: float = FALSE_ALARM) -> Judged:
+def judge(
+    time: Array, value: Array, std: Array, *, tests: int = 1, false_alarm: float = FALSE_ALARM, least_span: float = 0.0
+) -> Judged:
     """`(n,)` each, in order of time, n >= 1. `tests`: how many series are looked at together. Steps, slope and alarm share
-    `false_alarm` in equal parts."""
+    `false_alarm` in equal parts. No slope is told over less than `least_span`."""
     each = false_alarm / (3 * tests)
-    steps = _steps(value, std, each)
+    slope, steps = _slope(time, value, std, each, least_span), _steps(value, std, each)
+    if steps and slope is not None and slope.rest <= _rest(value, std, [step.at for step in steps]):
+        steps = []  # the line leaves no more, and has less to be fitted: it drifts
     widening = _scatter(value, std, [step.at for step in steps])[0]
     begin = steps[-1].at if steps else 0
     level, level_std = _mean(value, std * widening, begin, value.size)
@@ -83,19 +88,21 @@ def judge(time: Array, value: Array, std: Array, *, tests: int = 1, false_alarm:
         level_std,
         widening,
         tuple(steps),
-        _slope(time[begin:], value[begin:], std[begin:], each),
+        _slope(time[begin:], value[begin:], std[begin:], each, least_span),
         _alarm(value, std, steps, each),
     )
 
 
 def _scatter(value: Array, std: Array, places: Sequence[int], *, fitted: int = 1) -> tuple[float, float]:
     """(actual over claimed noise, at least 1; degrees of freedom) around the levels between `places`."""
-    edges = [0, *places, value.size]
-    rest = 0.0
-    for begin, end in pairwise(edges):
-        rest += float(np.sum(((value[begin:end] - _mean(value, std, begin, end)[0]) / std[begin:end]) ** 2))
-    freedom = PRIOR_WEIGHT + max(value.size - fitted * (len(edges) - 1), 0)
-    return float(np.sqrt(max(1.0, (PRIOR_WEIGHT + rest) / freedom))), freedom
+    freedom = PRIOR_WEIGHT + max(value.size - fitted * (len(places) + 1), 0)
+    return float(np.sqrt(max(1.0, (PRIOR_WEIGHT + _rest(value, std, places)) / freedom))), freedom
+
+
+def _rest(value: Array, std: Array, places: Sequence[int]) -> float:
+    """Chi-square around the levels between `places`."""
+    parts = pairwise([0, *places, value.size])
+    return sum(float(np.sum(((value[a:b] - _mean(value, std, a, b)[0]) / std[a:b]) ** 2)) for a, b in parts)
 
 
 def _first_scatter(value: Array, std: Array) -> tuple[float, float]:
@@ -152,18 +159,19 @@ def _mean(value: Array, noise: Array, begin: int, end: int) -> tuple[float, floa
     return float(np.sum(weight * value[begin:end]) / np.sum(weight)), float(np.sum(weight) ** -0.5)
 
 
-def _slope(time: Array, value: Array, std: Array, chance: float) -> Slope | None:
-    """Weighted least squares; None for fewer than four points or no time between them."""
-    if value.size <= LEAST or np.ptp(time) <= 0.0:
+def _slope(time: Array, value: Array, std: Array, chance: float, least_span: float) -> Slope | None:
+    """Weighted least squares; None for fewer than four points or no time between them, or less than `least_span`."""
+    if value.size <= LEAST or np.ptp(time) <= 0.0 or np.ptp(time) < least_span:
         return None
     weight = 1.0 / std**2
     from_middle = time - np.sum(weight * time) / np.sum(weight)
     spread = float(np.sum(weight * from_middle**2))
     slope = float(np.sum(weight * from_middle * value) / spread)
-    widening, freedom = _scatter(value - slope * from_middle, std, (), fitted=2)
+    around = value - slope * from_middle
+    widening, freedom = _scatter(around, std, (), fitted=2)
     error = widening * spread**-0.5
     probability = 2.0 * float(stdtr(freedom, -abs(slope) / error))
-    return Slope(slope, error, probability, probability <= chance)
+    return Slope(slope, error, probability, probability <= chance, _rest(around, std, ()))
 
 
 def _alarm(value: Array, std: Array, steps: Sequence[Step], chance: float) -> Alarm | None:

@@ -100,7 +100,7 @@ def commissioned(case: Case) -> Row:
             highest_flux_wb = drawn.highest_flux_wb
     except CommissionerError as error:
         ended, highest_flux_wb = RunEnded(error.outcome, error.what, 0.0, error.as_dict()), drawn.highest_flux_wb
-    told = row | _told(drawn, findings, ended, highest_flux_wb) | {"cpu_s": time.process_time() - began}
+    told = row | _told(drawn, findings, ended, highest_flux_wb, plan.axes_deg) | {"cpu_s": time.process_time() - began}
     return cast("Row", told)
 
 
@@ -139,7 +139,9 @@ def _perform(inverter: Inverter, job: Job, findings: Findings) -> RunEnded:
     return runner.perform(course(job, findings))
 
 
-def _told(drawn: Drawn, findings: Findings, ended: RunEnded, highest_flux_wb: float) -> dict[str, Any]:
+def _told(
+    drawn: Drawn, findings: Findings, ended: RunEnded, highest_flux_wb: float, axes_deg: Sequence[float]
+) -> dict[str, Any]:
     limit_wb, found = findings.flux_limit_wb, findings.identification
     told: dict[str, Any] = {
         "outcome": ended.outcome, "reason": ended.reason, "energised_s": ended.energised_s,
@@ -147,7 +149,7 @@ def _told(drawn: Drawn, findings: Findings, ended: RunEnded, highest_flux_wb: fl
     }  # fmt: skip
     if found is None:
         return told
-    truth = drawn.parameters_at(found.holds_for_flux_wb)
+    truth = drawn.parameters_at(found.holds_for_flux_wb, axes_deg)
     for name, value, std in zip(PARAMETERS, found.parameters.as_tuple(), found.std, strict=True):
         told |= {f"{name}_true": truth[name], f"{name}_value": value, f"{name}_std": std}
     return told

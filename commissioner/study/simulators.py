@@ -27,8 +27,9 @@ class Drawn(Protocol):
         """Peak stator flux that really was."""
         ...
 
-    def parameters_at(self, stator_flux_wb: float) -> Mapping[str, float]:
-        """The true inverse-Gamma values at a peak stator flux, by the contract's names, SI."""
+    def parameters_at(self, stator_flux_wb: float, axes_deg: Sequence[float]) -> Mapping[str, float]:
+        """The true inverse-Gamma values at a peak stator flux, by the contract's names, SI, as the sensors scale what is tested
+        along these axes."""
         ...
 
 

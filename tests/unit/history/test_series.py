@@ -63,9 +63,25 @@ def test_two_steps_are_found_and_the_level_is_that_of_now():
     assert abs(seen.level - 3.0) < 2.0
 
 
-def test_a_drift_is_a_slope_with_its_size():
-    seen = series(2.0 * np.arange(12.0))
-    assert seen.slope is not None and (seen.slope.is_significant or seen.steps)
+@pytest.mark.parametrize(("points", "over_all"), [(6, 20.0), (12, 12.0), (12, 24.0), (24, 8.0), (24, 80.0)])
+def test_a_drift_is_a_slope_with_its_size_and_no_steps(points, over_all):
+    """A winding that ages evenly has no day on which it began: at most one of 20 is told as steps."""
+    seen = [series(np.linspace(0.0, over_all, points), seed=seed) for seed in range(20)]
+    drifting = [one.slope for one in seen if not one.steps and one.slope is not None and one.slope.is_significant]
+    assert len(drifting) >= 19
+    assert all(abs(slope.value - over_all / (points - 1)) < 4 * slope.std for slope in drifting)
+
+
+def test_a_drift_within_less_than_the_least_span_stays_steps():
+    time, value = np.arange(12.0), 4.0 * np.arange(12.0)
+    seen = judge(time, value, np.ones(12), least_span=20.0)
+    assert seen.slope is None and seen.steps
+
+
+@pytest.mark.parametrize("at", [2, 4, 8, 12, 16])
+def test_a_step_stays_a_step_where_a_line_might_pass_for_it(at):
+    seen = [series(np.where(np.arange(18) < at, 0.0, 9.0), seed=seed) for seed in range(20)]
+    assert sum([step.at for step in one.steps] == [at] for one in seen) >= 19
 
 
 def test_a_slow_drift_is_told_within_its_error():

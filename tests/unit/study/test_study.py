@@ -142,7 +142,7 @@ def test_spread_moves_the_truth_and_not_the_plate():
         simulator().draw("haumer_132m04", seed, spread=0.2, effects=(), noise_a=None, faults=()) for seed in (1, 2)
     ]
     assert draws[0].plate == draws[1].plate
-    first, second = (draw.parameters_at(0.5) for draw in draws)
+    first, second = (draw.parameters_at(0.5, (0.0,)) for draw in draws)
     assert first != second
     assert set(first) == {
         "stator_resistance_ohm",
@@ -150,6 +150,22 @@ def test_spread_moves_the_truth_and_not_the_plate():
         "leakage_inductance_h",
         "magnetizing_inductance_h",
     }
+
+
+@pytest.mark.parametrize(
+    ("axes_deg", "gain"),
+    [
+        ((0.0,), (4 * 1.003 + 0.998 + 1.001) / 6), ((120.0,), (1.003 + 4 * 0.998 + 1.001) / 6), ((90.0,), (0.998 + 1.001) / 2),
+        ((0.0, 60.0, 120.0), (1.003 + 0.998 + 1.001) / 3), ((0.0, 90.0), (1.003 + 0.998 + 1.001) / 3),
+    ],
+)  # fmt: skip
+def test_the_truth_is_scaled_as_the_sensors_scale_the_axes_that_were_tested(axes_deg, gain):
+    """Closed form: the current along phase u is two thirds of i_u - i_v / 2 - i_w / 2; across it, v and w alone read it."""
+    drawn = simulator().draw("haumer_132m04", 1, spread=0.2, effects=(), noise_a=None, faults=())
+    assert drawn.document.get("sensors", {}).get("gain") is None  # as sim/physics/machine.py has them
+    leakage = drawn.parameters_at(0.5, (0.0, 60.0, 120.0))["leakage_inductance_h"]
+    mean = (1.003 + 0.998 + 1.001) / 3
+    assert drawn.parameters_at(0.5, axes_deg)["leakage_inductance_h"] == pytest.approx(leakage * mean / gain, rel=1e-12)
 
 
 def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
@@ -361,7 +377,7 @@ def test_a_motor_file_is_a_motor_by_its_plate_and_a_scenario_file_is_moved(tmp_p
         assert (drawn.motor, drawn.plate["rated_power_w"]) == (name, rated_w)
         assert drawn.plate == other.plate
         assert drawn.document["sensors"]["noise_a"] == 0.05
-        truth, moved = (one.parameters_at(0.5)["leakage_inductance_h"] for one in (drawn, other))
+        truth, moved = (one.parameters_at(0.5, (0.0,))["leakage_inductance_h"] for one in (drawn, other))
         assert 0.0 < abs(moved / truth - 1.0) < 0.25
 
 
