@@ -26,7 +26,7 @@ from commissioner.monitor.machine.estimate import estimate
 from commissioner.monitor.machine.fit import Fitted, Problem, Start
 from commissioner.monitor.machine.proof import Proof, prove
 from commissioner.monitor.machine.slow_slip import slip_phase
-from commissioner.monitor.machine.systematic import with_sensors
+from commissioner.monitor.machine.systematic import with_systematic
 from commissioner.monitor.machine.waveform import Solved, Waveform
 from commissioner.monitor.periods import combs as comb_search
 from commissioner.monitor.periods.combs import SUPPLY_ORDERS, Found
@@ -179,7 +179,7 @@ def _invert(
             combs = bent
             lines = _lines(audited, frame, part, combs)
             lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std, delay_std)
-    solved = with_sensors(
+    solved = with_systematic(
         waveform.solve(problem, fitted, kept), audited.sensors.gain_std, lines, len(combs), problem, fitted, start
     )
     period = characteristic(audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia)

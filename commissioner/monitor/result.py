@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, astuple, fields
 from typing import cast
 
 import numpy as np
@@ -28,11 +28,13 @@ from commissioner.monitor.contract import (
     WatchedRow,
 )
 from commissioner.monitor.intake.findings import Audited, Finding
-from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
+from commissioner.monitor.machine.fit import NAMES, Fitted
+from commissioner.monitor.machine.waveform import Solved
 from commissioner.monitor.partial import Partial, of_terminals
 from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
 from commissioner.monitor.trend.trend import FALSE_ALARM, Entry, Verdict
 from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS
+from commissioner.motor.running import TCircuit
 
 QUANTITIES = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
 OPEN = 0.25
@@ -76,8 +78,8 @@ def as_document(
         "sensors": _sensors(observation),
         "slip": observation.slip,
         "segment": _segment(observation),
-        "parameters": _parameters(observation.fitted),
-        "t_model": _t_model(observation.fitted),
+        "parameters": _parameters(observation.solved),
+        "t_model": _t_model(observation.solved),
         "parameters_from": observation.start.origin,
         "cannot_be_fixed": cannot_be_fixed(observation.fitted),
         "periods": [
@@ -118,7 +120,7 @@ def why_no_load_torque(observation: Observation) -> str:
     """Words for an answer without load torque."""
     if observation.inertia_kg_m2 is None:
         return "not given: the inertia is unknown (inertia_kg_m2 or --inertia)"
-    return "not given: its uncertainty is larger than its movement within the period"
+    return "not given: its movement within the period is smaller than the uncertainty of that movement"
 
 
 def refused_document(refused: Refused) -> RefusedMonitoring:
@@ -276,30 +278,28 @@ def _segment(observation: Observation) -> dict[str, float]:
     }
 
 
-def _parameters(fitted: Fitted) -> dict[str, Measured]:
-    names = PARAMETERS
-    value = np.array(fitted.circuit.as_inverse_gamma().as_tuple())
-    moved = np.array([circuit_at(fitted, step).as_inverse_gamma().as_tuple() for step in steps(fitted)])
-    std = np.sqrt(np.sum((moved - value) ** 2, axis=0))
-    constant = fitted.circuit.as_inverse_gamma().rotor_time_constant_s
-    constants = [circuit_at(fitted, step).as_inverse_gamma().rotor_time_constant_s for step in steps(fitted)]
-    out = {name: quantity(v, s) for name, v, s in zip(names, value, std, strict=True)}
-    out["rotor_time_constant_s"] = quantity(constant, float(np.sqrt(np.sum((np.array(constants) - constant) ** 2))))
-    return out
+def _parameters(solved: Solved) -> dict[str, Measured]:
+    return _spread(
+        solved, lambda c: (*c.as_inverse_gamma().as_tuple(), c.as_inverse_gamma().rotor_time_constant_s),
+        (*PARAMETERS, "rotor_time_constant_s"),
+    )  # fmt: skip
 
 
-def _t_model(fitted: Fitted) -> TModel:
-    c = fitted.circuit
-    std = np.sqrt(np.diag(fitted.log_covariance))
+def _t_model(solved: Solved) -> TModel:
+    c = solved.circuit
     share = c.stator_leakage_h / (c.stator_leakage_h + c.rotor_leakage_h)
-    return {
-        "stator_resistance_ohm": quantity(c.stator_resistance_ohm, std[0] * c.stator_resistance_ohm),
-        "rotor_resistance_ohm": quantity(c.rotor_resistance_ohm, std[1] * c.rotor_resistance_ohm),
-        "magnetizing_inductance_h": quantity(c.magnetizing_inductance_h, std[2] * c.magnetizing_inductance_h),
-        "stator_leakage_h": quantity(c.stator_leakage_h, std[3] * c.stator_leakage_h),
-        "rotor_leakage_h": quantity(c.rotor_leakage_h, std[3] * c.rotor_leakage_h),
-        "assumption": EQUAL_LEAKAGE if abs(share - 0.5) < 1e-9 else f"{share:.2f} of the leakage in the stator",
-    }
+    said = EQUAL_LEAKAGE if abs(share - 0.5) < 1e-9 else f"{share:.2f} of the leakage in the stator"
+    return cast("TModel", {**_spread(solved, astuple, tuple(f.name for f in fields(c))), "assumption": said})
+
+
+def _spread(
+    solved: Solved, values_of: Callable[[TCircuit], tuple[float, ...]], names: tuple[str, ...]
+) -> dict[str, Measured]:
+    """Values of the circuit, each with what all one-sigma changes, the sensors' and the iron's too, make of it."""
+    value = np.array(values_of(solved.circuit))
+    moved = np.array([values_of(change[0]) for change in solved.changes])
+    std = np.sqrt(np.sum((moved - value) ** 2, axis=0))
+    return {name: quantity(v, s) for name, v, s in zip(names, value, std, strict=True)}
 
 
 def with_reference(document: MonitoringDocument, comparison: Mapping[str, float]) -> MonitoringDocument:

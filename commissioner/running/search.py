@@ -20,6 +20,7 @@ from commissioner.estimation.fit import (
     with_noise_of,
 )
 from commissioner.estimation.numbers import AT, NAMES
+from commissioner.estimation.record import Record
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
 from commissioner.running.nominal import nominal
@@ -263,16 +264,22 @@ def _tried(seeking: Search, held: Fit, fit: Fit, accepted: tuple[Named, ...]) ->
     return sorted(tried, key=lambda t: -t.worth)
 
 
+def least_strength(record: Record) -> float:
+    """Strength over noise that a name needs in such a recording."""
+    if record.is_steady:
+        return RULES.material_steady_sigma
+    return RULES.material_sigma if record.has_speed else RULES.material_unheld_sigma
+
+
 def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[Named], gain: float) -> str:
     """Why the last of these causes is not taken in beside those of `fit`; empty where it is."""
-    is_steady = seeking.problem.record.is_steady
     if gain / other.scale < _needed(seeking, causes[-1]):
         return "gains too little"
     left = fit.chi2 - fit.count
     is_all_of_it = left > RULES.certain_left * fit.count and gain > RULES.all_of_it * left
     if gain < RULES.least_share * max(seeking.base.chi2 - fit.chi2, 0.0) and not is_all_of_it:
         return "gains less than what the laws of the accepted causes leave"
-    if np.sqrt(gain / fit.count) < (RULES.material_steady_sigma if is_steady else RULES.material_sigma):
+    if np.sqrt(gain / fit.count) < least_strength(seeking.problem.record):
         return "too small to matter"
     if not seeking.is_plausible(other, causes):
         return "its size is one that physics does not allow"

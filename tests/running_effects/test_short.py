@@ -1,10 +1,14 @@
 """The blind protocol, short: what is hidden is named with its size, and nothing is where nothing is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from commissioner.estimation.record import prepare
 from commissioner.running.diagnosis import Verdict, diagnose
 from commissioner.running.identification import identify
+from commissioner.running.search import least_strength
 from tests.running_effects.cases import Case, taken, true_size
 from tests.running_effects.protocol import failures, false_names, gains_elsewhere, run, table
 
@@ -130,3 +134,14 @@ def test_the_table_counts_what_the_rows_say():
     assert "| nulls with a name | 1 of 1 |" in text
     assert "0.500 (1 false of 2)" in text
     assert len(failures(rows)) == 2
+
+
+def test_a_name_needs_more_where_nothing_is_held_out():
+    """A healthy motor whose load swung once a turn from the start on was a saturation of 0.03 of the noise, without a speed column."""
+    start, steady = (
+        prepare([recording], plate)
+        for recording, plate, _ in (
+            taken(Case(5004, "null", course).scenario(), 5004) for course in ("start", "steady")
+        )
+    )
+    assert least_strength(start) < 0.0305 < least_strength(replace(start, has_speed=False)) < least_strength(steady)

@@ -15,7 +15,7 @@ from commissioner.records import RunningRecording
 
 RESISTANCE_STD, SLIP_STD, IRON_STD = 0.4, 0.25, 0.02
 """Relative: of the plate's stator resistance, of slip over torque (tolerance of IEC 60034-1 and temperature), and of the
-power for iron loss and sensors."""
+apparent power for iron loss (which light load does not lower) and sensors."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,10 @@ def from_terminals(part: RunningRecording, plate: Nameplate, frequency_hz: float
     copper = 1.5 * from_nameplate(plate).stator_resistance_ohm * float(np.mean(np.abs(current) ** 2))
     synchronous = 2.0 * math.pi * frequency_hz / plate.pole_pairs
     torque = (power - copper) / synchronous
-    torque_std = math.hypot(RESISTANCE_STD * copper, IRON_STD * apparent) / synchronous
+    volts = float(np.sqrt(1.5 * np.mean(np.abs(voltage) ** 2)))
+    rated_apparent = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a
+    of_iron = IRON_STD * max(apparent, rated_apparent * (volts / plate.rated_voltage_v) ** 2)
+    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron) / synchronous
     rated_nm = plate.rated_power_w / (plate.rated_speed_rpm * math.pi / 30.0)
     flux = float(np.sqrt(np.mean(np.abs(voltage) ** 2) / 2.0)) / frequency_hz
     rated_flux = plate.rated_voltage_v / math.sqrt(3.0) / plate.rated_frequency_hz

@@ -109,7 +109,7 @@ def band_weights(problem: Problem, fitted: Fitted) -> Vector:
     _, upper, lower = inversion.complex_speed(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
     error = problem.band_error
     moved_up, moved_low = list(error.gap_upper), list(error.gap_lower)
-    for step in fitting.steps(fitted, held=True):
+    for step in fitting.steps(fitted):
         circuit = fitting.circuit_at(fitted, step)
         _, up, low = inversion.complex_speed(circuit, problem.pole_pairs, problem.lines, problem.on)
         moved_up.append(up - upper)

@@ -160,9 +160,9 @@ def advanced(lines: Lines, delay_s: float) -> Lines:
     return replace(lines, current_a=lines.current_a * turn, current_influence=lines.current_influence * turn)
 
 
-def steps(fitted: Fitted, held: bool = False) -> NDArray[np.float64]:
-    """Four moves of the logarithms whose outer products sum to their covariance; `held`: with the delay as it was found."""
-    values, vectors = np.linalg.eigh(fitted.held_covariance if held else fitted.log_covariance)
+def steps(fitted: Fitted) -> NDArray[np.float64]:
+    """Four moves of the logarithms whose outer products sum to their covariance with the delay as it was found."""
+    values, vectors = np.linalg.eigh(fitted.held_covariance)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T)
 
 

@@ -27,6 +27,15 @@ from commissioner.records import Signal
 
 
 @dataclass(frozen=True)
+class Parts:
+    """One number of each curve."""
+
+    speed: float
+    torque: float
+    load_torque: float
+
+
+@dataclass(frozen=True)
 class Waveform:
     """At `(n,)` instants; the load torque is None where the inertia is unknown or the data cannot carry it. Standard deviations likewise."""
 
@@ -38,8 +47,10 @@ class Waveform:
     speed_std: Signal
     torque_std: Signal
     load_torque_std: Signal | None
-    noise_rms: tuple[float, float, float]
-    """Speed, torque, load torque: the part of the deviations that is drawn anew in each recording, rms over the period."""
+    moving_std: Parts
+    """Of the curves around their means, rms over the period: what a wrong mean shifts as a whole is not in it."""
+    noise_rms: Parts
+    """The part of the deviations that is drawn anew in each recording, rms over the period."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +133,7 @@ def _parameter_changes(
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     _, start_up, start_low = complex_speed(fitted.circuit, pairs, lines, on)
     changes = []
-    for step in steps(fitted, held=True):
+    for step in steps(fitted):
         circuit = circuit_at(fitted, step)
         mean, upper, lower = complex_speed(circuit, pairs, lines, on)
         value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
@@ -138,48 +149,32 @@ def evaluate(
     """All quantities at instants where the combs have the phases given."""
     lines, pairs = problem.lines, problem.pole_pairs
     basis = basis_of(lines, comb_phases_rad, time_s.size)
-    value = _at(solved.circuit, pairs, problem, basis, solved.speed, solved.state.flux_wb, lines.current_a)
-    moved = [
-        _at(circuit, pairs, problem, basis, speed, flux, current) for circuit, speed, flux, current in solved.changes
-    ]
-    left_out = (solved.kept.speed_variance, 0.0)
-    spread = [np.sqrt(sum((m[k] - value[k]) ** 2 for m in moved) + left_out[k]) for k in range(2)]
-    inertia = inertia_kg_m2
-    load_std = None
-    if inertia is not None:
-        load_std = np.sqrt(
-            sum((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2 for m in moved)
-            + inertia**2 * solved.kept.acceleration_variance
-        )
+    inertia = inertia_kg_m2 or 0.0
+
+    def shown(circuit: TCircuit, speed: SpeedLines, flux: Vector, current: Vector) -> Signal:
+        turning, torque, acceleration = _at(circuit, pairs, problem, basis, speed, flux, current)
+        return np.stack([turning, torque, torque - inertia * acceleration])
+
+    value = shown(solved.circuit, solved.speed, solved.state.flux_wb, lines.current_a)
+    change = np.stack([shown(*one) - value for one in solved.changes])
+    left_out = np.array([solved.kept.speed_variance, 0.0, inertia**2 * solved.kept.acceleration_variance])
+    std = np.sqrt(np.sum(change**2, axis=0) + left_out[:, None])
+    moving = np.sqrt(np.sum(np.var(change, axis=2), axis=0) + left_out)
+    noise = np.sqrt(np.sum(np.mean(change[: lines.current_influence.shape[0]] ** 2, axis=2), axis=0))
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (value[0][1:] + value[0][:-1]) * np.diff(time_s))])
+    load = (None, None) if inertia_kg_m2 is None else (value[2], std[2])
     return Waveform(
-        time_s,
-        angle,
-        value[0],
-        value[1],
-        None if inertia is None else value[1] - inertia * value[2],
-        spread[0],
-        spread[1],
-        load_std,
-        _noise_rms(value, moved[: lines.current_influence.shape[0]], inertia or 0.0),
-    )
+        time_s, angle, value[0], value[1], load[0], std[0], std[1], load[1], Parts(*moving), Parts(*noise)
+    )  # fmt: skip
 
 
 def without_unknown_load(made: Waveform) -> Waveform:
-    """No load torque where its uncertainty is larger than its own movement: such a curve would show noise."""
+    """No load torque where its movement's uncertainty is larger than the movement: such a curve would show noise."""
     if made.load_torque_nm is None or made.load_torque_std is None:
         return made
-    if np.sqrt(np.mean(made.load_torque_std**2)) < np.std(made.load_torque_nm):
+    if made.moving_std.load_torque < np.std(made.load_torque_nm):
         return made
     return replace(made, load_torque_nm=None, load_torque_std=None)
-
-
-def _noise_rms(
-    value: tuple[Signal, Signal, Signal], moved: list[tuple[Signal, Signal, Signal]], inertia: float
-) -> tuple[float, float, float]:
-    speed, torque = (sum(np.mean((m[k] - value[k]) ** 2) for m in moved) for k in range(2))
-    load = sum(np.mean((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2) for m in moved)
-    return float(np.sqrt(speed)), float(np.sqrt(torque)), float(np.sqrt(load))
 
 
 def _at(

@@ -88,7 +88,8 @@ def _find_shaft(
         )
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
         if powers.max() > periods.SHAFT_SIGNIFICANT or powers.sum() > 2 * periods.SHAFT_SIGNIFICANT:
-            return _refined(frame, part, residual, spectrum, "shaft", frequency, seen), table
+            top = periods.top_of_line(spectrum, frequency, seen)
+            return _refined(frame, part, residual, spectrum, "shaft", top, seen), table
     return None, table
 
 

@@ -26,6 +26,8 @@ SHAFT_SIGNIFICANT = 12.0
 """In the few dozen cells of the slip range that the operating point allows: below 1e-7 in all of them."""
 CAP = 40.0
 """One line cannot outvote the operating point by more than this."""
+LOBE_CELLS = 4 / 3
+"""From a line's top to the foot of its main lobe, in cells of 1.5 over the length (Hann's window: two over the length)."""
 DYNAMIC_RANGE = 1e-5
 """Below 100 dB no sensor is linear, so without noise the floor is not zero."""
 LOWEST_LOAD_HZ = 0.8
@@ -181,6 +183,14 @@ def shaft_candidates(
         if len(best) >= 5:
             break
     return best
+
+
+def top_of_line(spectrum: PairSpectrum, frequency_hz: float, orders: tuple[int, ...]) -> float:
+    """The frequency of most power within the lines' own width: the capped score is flat over strong ones, and the operating
+    point alone would choose a place on their skirt."""
+    reach, step = LOBE_CELLS * spectrum.cell_hz / min(orders), spectrum.frequency_hz[1] / max(orders)
+    grid = frequency_hz + np.arange(-reach, reach + step, step)
+    return float(grid[np.argmax(sum(_line_at(spectrum, grid * h) for h in orders))])
 
 
 def _line_at(spectrum: PairSpectrum, frequency_hz: Signal) -> Signal:

@@ -163,17 +163,17 @@ def rotor_side_bands(spectrum: PairSpectrum, supply_hz: float, slip: float, curr
 
 def trendable(observation: Observation, made: Pulses | None) -> list[Indicator]:
     """Everything that a baseline watches."""
-    period = observation.period
+    period, moving = observation.period, observation.period.moving_std
     fundamental = observation.audited.fundamental
     assert fundamental is not None
     out = [
         Indicator(
-            "speed_ripple_rad_per_s", *_ripple(period.speed_rad_per_s, period.speed_std, period.noise_rms[0]), "rad/s"
+            "speed_ripple_rad_per_s", *_ripple(period.speed_rad_per_s, moving.speed, period.noise_rms.speed), "rad/s"
         ),
-        Indicator("torque_ripple_nm", *_ripple(period.torque_nm, period.torque_std, period.noise_rms[1]), "N m"),
+        Indicator("torque_ripple_nm", *_ripple(period.torque_nm, moving.torque, period.noise_rms.torque), "N m"),
     ]
-    if period.load_torque_nm is not None and period.load_torque_std is not None:
-        ripple = _ripple(period.load_torque_nm, period.load_torque_std, period.noise_rms[2])
+    if period.load_torque_nm is not None:
+        ripple = _ripple(period.load_torque_nm, moving.load_torque, period.noise_rms.load_torque)
         out.append(Indicator("load_torque_ripple_nm", *ripple, "N m"))
     if made is not None:
         out.append(Indicator("pulse_dissimilarity_percent", made.dissimilarity, made.dissimilarity_noise, "%"))
@@ -183,8 +183,7 @@ def trendable(observation: Observation, made: Pulses | None) -> list[Indicator]:
     return out
 
 
-def _ripple(values: Signal, std: Signal, noise: float) -> tuple[Quantity, float]:
-    """Amplitude of the sine with the same rms, with the rms standard deviation of its points; a peak would jump with each
-    order that one recording shows and another does not."""
-    spread = float(np.sqrt(np.mean(std**2)))
-    return Quantity(float(np.sqrt(2.0) * np.std(values)), spread), noise
+def _ripple(values: Signal, std: float, noise: float) -> tuple[Quantity, float]:
+    """Amplitude of the sine with the same rms, with the rms standard deviation of its points around their mean; a peak would
+    jump with each order that one recording shows and another does not."""
+    return Quantity(float(np.sqrt(2.0) * np.std(values)), std), noise

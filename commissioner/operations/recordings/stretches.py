@@ -19,6 +19,8 @@ from commissioner.records import ReadingNote, RunningRecording
 
 SHORT = frozenset({"too_short", "too_few_periods"})
 """Refusals of a stretch that is steady, but short."""
+SILENT = frozenset({"no_period", "no_shaft_line"})
+"""Refusals of a stretch that is steady, but too even for the shaft to be seen: a fan, a pump, a healthy coupling."""
 MARGIN_S = 0.06
 """At either end of a steady stretch: the window that finds it reaches so far over its edge."""
 
@@ -35,7 +37,12 @@ def in_its_states(
     stretches = states(recording, plate)
     if {s.state for s in stretches} <= {"steady", "lost"}:
         seen = observe(recording, plate, wishes)
-        return seen, recording, [as_state(s, used=s.state == "steady") for s in stretches]
+        out = [as_state(s, used=s.state == "steady") for s in stretches]
+        if isinstance(seen, Refused) and seen.reason.code in SILENT:
+            for stretch, state in zip(stretches, out, strict=True):
+                if stretch.state == "steady":
+                    _add_own(state, recording, stretch, plate, wishes, is_watched=True)
+        return seen, recording, out
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
         return (
@@ -100,17 +107,18 @@ def longest_steady(
 
 
 def said_by_terminals(seen: Refused, stretches: list[State]) -> Partial | None:
-    """Of a recording of several states whose steady ones are too short for the chain: what the terminals say of the longest."""
+    """Of a recording whose steady stretches are too short or too even for the chain: what the terminals say of the longest."""
     told = [s for s in stretches if s["state"] == "steady" and "mean_torque_nm" in s]
-    if seen.reason.code not in SHORT or len(stretches) < 2 or not told:
+    if seen.reason.code not in SHORT | SILENT or not told:
         return None
     best = max(told, key=lambda s: s["end_s"] - s["start_s"])
     for state in stretches:
         state["used"] = state is best
     speed, torque = best["mean_speed_rad_per_s"], best["mean_torque_nm"]
-    why = f"{seen.reason.what}; at least {seen.reason.limit}".replace("at least at least", "at least")
+    wanted = "" if seen.reason.limit is None else f"; at least {seen.reason.limit}"
+    why = f"{seen.reason.what}{wanted}".replace("at least at least", "at least")
     withheld = dict.fromkeys(("parameters", "periods", "waveforms", "trend"), why)
-    unused = ", ".join(sorted({s["state"] for s in stretches if s["state"] not in ("steady", "off")}))
+    unused = ", ".join(sorted({s["state"] for s in stretches if s["state"] not in ("steady", "off", "lost")}))
     if unused:
         withheld["from other states"] = (
             f"{unused}: `identify` and `diagnose` use a start, a ramp or a load step, this verb does not"

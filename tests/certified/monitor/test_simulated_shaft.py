@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from commissioner.monitor.result import as_document
 from commissioner.monitor.trend.indicators import pulses, rotor_side_bands
 from commissioner.motor.circuit import from_t_model
 from sim.recordings.running import load_scenario, run
@@ -166,3 +167,19 @@ def test_a_healthy_rotor_has_no_side_bands() -> None:
     bands = rotor_side_bands(seen.found.left_over, seen.search.supply_hz, seen.slip, abs(seen.lines.current_a[0]))
     assert bands is not None
     assert bands.above_floor_db < 12.5
+
+
+def test_iron_and_gains_are_in_the_deviations_but_not_in_those_of_a_ripple() -> None:
+    """A gain common to three current sensors scales every impedance; a watt of iron loss is at the terminals one of the shaft."""
+    seen = answer("running_compressor")
+    document = as_document(seen, None, [], None)
+    for name in ("rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"):
+        found = document["parameters"][name]
+        assert found["std"] > 0.9 * document["sensors"]["gain_std"] * found["value"], name
+    fundamental = seen.audited.fundamental
+    apparent = 1.5 * abs(fundamental.voltage_v * fundamental.current_a)
+    synchronous = seen.lines.supply_rad_per_s / seen.pole_pairs
+    iron_nm = float(np.sqrt(seen.mean_torque_std**2 - seen.mean_torque_sensor_std**2))
+    assert 0.9 < iron_nm / (0.02 * apparent / synchronous) < 1.5
+    period = seen.period
+    assert period.moving_std.torque < 0.2 * np.sqrt(np.mean(period.torque_std**2))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from commissioner.monitor.machine.estimate import band_weights, speed_lines
 from commissioner.monitor.machine.fit import PRIOR_FROM_NAMEPLATE, Start, fit, pose
 from commissioner.monitor.machine.inversion import SpeedLines, complex_speed, rotor_state, torque_of, torus
+from commissioner.monitor.machine.waveform import Parts, Waveform, without_unknown_load
+from commissioner.monitor.periods.periods import CAP, pair_spectrum, top_of_line
 from commissioner.monitor.signals.averaging import Lines
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import (
@@ -177,3 +181,25 @@ def test_slip_at_power_and_at_current_invert_the_impedance() -> None:
     assert slip_at_current(MACHINE, SUPPLY, VOLTAGE, abs(current)) == pytest.approx(0.037, rel=1e-6)
     assert slip_at_power(MACHINE, SUPPLY, VOLTAGE, 1e6) == pull_out_slip(MACHINE, SUPPLY)
     assert slip_at_current(MACHINE, SUPPLY, VOLTAGE, 0.1) == 0.0
+
+
+def test_a_strong_line_is_followed_from_its_top_and_not_from_its_skirt() -> None:
+    """The capped score is flat over a strong line: 0.14 Hz beside it, where the operating point drew it, the phase wraps."""
+    period, shaft_hz = 2e-3, 23.4567
+    time = np.arange(5000) * period
+    noise = np.random.default_rng(2).standard_normal((2, time.size))
+    spectrum = pair_spectrum(np.cos(2 * np.pi * shaft_hz * time) + 1e-2 * (noise[0] + 1j * noise[1]), period, 100.0)
+    assert spectrum.at(shaft_hz + 0.14, 0.01)[0] > CAP
+    for beside in (-0.14, 0.0, 0.14):
+        assert top_of_line(spectrum, shaft_hz + beside, (1,)) == pytest.approx(shaft_hz, abs=0.025)
+
+
+def test_a_load_torque_whose_movement_is_known_is_shown_though_its_mean_is_not() -> None:
+    angle = 2 * np.pi * np.arange(90) / 90
+    parts = Parts(0.0, 0.0, 0.01)
+    unsure = Waveform(
+        angle, angle, angle, angle, 10 + 0.1 * np.sin(angle), angle, angle, np.full(90, 0.5), parts, parts
+    )  # fmt: skip
+    assert without_unknown_load(unsure).load_torque_nm is unsure.load_torque_nm
+    noisy = replace(unsure, moving_std=Parts(0.0, 0.0, 0.1))
+    assert without_unknown_load(noisy).load_torque_nm is None

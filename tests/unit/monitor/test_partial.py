@@ -123,3 +123,20 @@ def test_the_band_stands_under_the_picture_of_an_import(tmp_path: Path) -> None:
     assert document["states"][0]["end_s"] == pytest.approx(0.2, abs=1e-3)
     page = Path(store(table, document, tmp_path / "out.csv")["picture"]).read_text("utf-8")
     assert "what state the motor was in" in page
+
+
+def test_a_load_without_ripple_has_torque_and_speed_of_the_terminals(tmp_path: Path) -> None:
+    """Nothing modulates the current: the air-gap power is known all the same, and light load has no less iron loss."""
+    made = columns(volts=True)
+    random = np.random.default_rng(7)
+    for k, p in enumerate("uvw"):
+        turn = np.exp(-1j * (0.85 + 2 * np.pi * k / 3))
+        clean = (5.6 * np.exp(2j * np.pi * 50 * made["time_s"]) * turn).real
+        made[f"current_{p}_a"] = clean + 5e-3 * random.standard_normal(clean.size)
+    document = watched(tmp_path, made, PLATE).document
+    power, copper = 1.5 * 326.6 * 5.6 * np.cos(0.85), 1.5 * 3.7 * 5.6**2
+    torque, speed = document["mean_torque_nm"], document["mean_speed_rad_per_s"]
+    assert torque["value"] == pytest.approx((power - copper) / (50 * np.pi), abs=torque["std"])
+    assert torque["std"] > 0.02 * np.sqrt(3) * 400.0 * 4.86 / (50 * np.pi) > 0.1 * torque["std"]
+    assert 0.0 < 50 * np.pi - speed["value"] < 2 * (50 * np.pi - 1436 * np.pi / 30)
+    assert "neither the shaft" in document["withheld"]["periods"]
