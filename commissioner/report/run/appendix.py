@@ -40,7 +40,7 @@ _TOLD: Mapping[str, Callable[[Record], str]] = {
         f"{len(r['written'])} values written and read back{', stored' if r['is_stored'] else ''}"
     ),
     "error": lambda r: "{} (step {}, seen {}, limit {})".format(
-        r["what"], r["step"], *seen_and_limit(r, r.get("unit") or "")
+        r.get("what", "failure"), r.get("step"), *seen_and_limit(r, r.get("unit") or "")
     ),
     "disarmed": lambda r: (
         f"output off, {'confirmed by the drive: ' + str(r['verified']['state']) if r['verified']['is_confirmed'] else 'NOT confirmed'}; {r['because']}"
