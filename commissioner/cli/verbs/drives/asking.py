@@ -93,7 +93,7 @@ class Answers:
 
 def answers() -> Answers:
     """Asked on stderr. UsageError: too little to prove anything."""
-    name, source = ask("Name of the drive"), ask("Document or manual with its register table")
+    name, source = text("Name of the drive"), text("Document or manual with its register table")
     labels = tuple(
         Known(key, register(), value_in(unit), unit, page(source))
         for key, (unit, words) in LABELS.items()
@@ -109,7 +109,7 @@ def answers() -> Answers:
     parameters = _parameters(source)
     status, keeping, tuning = _status(source), _keeping(), ""
     if parameters:
-        tuning = ask("Page of its own tuning at standstill (empty: none)", default="")
+        tuning = text("Page of its own tuning at standstill (empty: none)", default="")
     return Answers(name, source, labels, parameters, status, keeping, tuning)
 
 
@@ -172,9 +172,14 @@ def sure(words: str) -> bool:
     return typer.confirm(words, err=True)
 
 
-def ask(words: str, read: Callable[[str], Answer] = str.strip, default: str | None = None) -> Answer:  # type: ignore[assignment]
-    """What `read` makes of the answer; BadParameter is asked again."""
-    answer: Answer = typer.prompt(words, value_proc=read, default=default, show_default=False, err=True)
+def text(words: str, default: str | None = None) -> str:
+    said: str = typer.prompt(words, default=default, show_default=False, err=True)
+    return said.strip()
+
+
+def ask(words: str, read: Callable[[str], Answer]) -> Answer:
+    """What `read` makes of the answer; after a BadParameter it is asked again."""
+    answer: Answer = typer.prompt(words, value_proc=read, err=True)
     return answer
 
 
@@ -184,44 +189,44 @@ def choice(words: str, among: tuple[str, ...]) -> str:
 
 
 def page(source: str) -> str:
-    return f"{source}, {ask('  page')}"
+    return f"{source}, {text('  page')}"
 
 
 def register() -> int:
     return ask("  its register as printed (decimal, or 0x...)", whole)
 
 
-def whole(text: str) -> int:
+def whole(said: str) -> int:
     """As printed; leading zeros are no octal number."""
     try:
-        return int(text, 16 if text.strip().lower().startswith("0x") else 10)
+        return int(said, 16 if said.strip().lower().startswith("0x") else 10)
     except ValueError:
-        raise typer.BadParameter(f"{text!r} is no register: write it as 1220, 40101 or 0x31A") from None
+        raise typer.BadParameter(f"{said!r} is no register: write it as 1220, 40101 or 0x31A") from None
 
 
-def bit(text: str) -> int:
-    if text.strip().isdecimal() and int(text) < 16:
-        return int(text)
-    raise typer.BadParameter(f"{text!r} is no bit: 0 is the lowest, 15 the highest")
+def bit(said: str) -> int:
+    if said.strip().isdecimal() and int(said) < 16:
+        return int(said)
+    raise typer.BadParameter(f"{said!r} is no bit: 0 is the lowest, 15 the highest")
 
 
 def value_in(unit: str) -> float:
     return ask(f"  its value in {unit}", above_zero)
 
 
-def above_zero(text: str) -> float:
+def above_zero(said: str) -> float:
     """A value that proves something: zero stands in registers that nobody uses."""
     with suppress(ValueError):
-        value = float(text.strip().replace(",", "."))
+        value = float(said.strip().replace(",", "."))
         if 0.0 < value < math.inf:
             return value
-    raise typer.BadParameter(f"{text!r} is no value above zero: write it as 400 or 5.1")
+    raise typer.BadParameter(f"{said!r} is no value above zero: write it as 400 or 5.1")
 
 
-def quantity(text: str) -> tuple[float, str]:
+def quantity(said: str) -> tuple[float, str]:
     """Number and unit."""
-    parts = re.fullmatch(r"\s*([\d.,]+)\s*([A-Za-zΩ%]+)\s*", text)
+    parts = re.fullmatch(r"\s*([\d.,]+)\s*([A-Za-zΩ%]+)\s*", said)
     shown = parts[2].replace("Ω", "ohm") if parts else ""
     if parts is None or shown.lower() not in UNITS:
-        raise typer.BadParameter(f"{text!r} is no value with its unit: write it as 3.2 ohm, 13 mH, 140 ms or 2.1 %")
+        raise typer.BadParameter(f"{said!r} is no value with its unit: write it as 3.2 ohm, 13 mH, 140 ms or 2.1 %")
     return above_zero(parts[1]), shown
