@@ -12,6 +12,7 @@ from commissioner.link.wire.url import DriveUrl, RtuUrl
 
 NOT_OURS = frozenset({errno.EACCES, errno.EPERM, errno.EBUSY, errno.EAGAIN})
 """The port is there and this user may not open it, or another program holds it."""
+NO_ROUTE = frozenset({errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN})
 NO_SERIAL_PORT = frozenset({errno.ENOTTY, errno.ENODEV, errno.EISDIR})
 HANDSHAKE = "handshake operation timed out"
 """What Python's ssl says within a TimeoutError: something listens there and does not speak TLS."""
@@ -35,6 +36,8 @@ def _of_network(error: Exception) -> str:
         return "this name is not known here: give the drive's number, as tcp://192.168.0.20:502"
     if isinstance(error, ConnectionRefusedError):
         return "nothing listens on this port there: check that Modbus TCP is switched on in the drive, the port, the address and the cable"
+    if isinstance(error, OSError) and error.errno in NO_ROUTE:
+        return "this computer has no way to that address: check the address, the cable and the network settings of this computer"
     return "check that the drive is powered, the cable, the address and that no other master holds it"
 
 

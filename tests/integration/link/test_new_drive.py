@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from commissioner.cli.verbs.drives.asking import quantity
+from commissioner.cli.verbs.drives.asking import quantity_of
 from commissioner.errors import CheckFailed
 from commissioner.link.files.drive_file import load_profile
 from commissioner.registers.convention import our_values
@@ -134,4 +134,34 @@ def test_a_reactance_is_of_the_motor_on_the_label(tmp_path):
     ("text", "value"), [("3.2 ohm", (3.2, "ohm")), ("13mH", (13.0, "mH")), ("3,2 Ω", (3.2, "ohm")), ("2 %", (2.0, "%"))]
 )
 def test_a_value_is_read_with_its_unit(text, value):
-    assert quantity(text) == value
+    assert quantity_of("rotor_resistance" if value[1] == "ohm" else "magnetizing_inductance")(text) == value
+
+
+def test_what_the_drive_does_not_show_is_asked_again_and_no_answer_is_lost(asked):
+    wrong = (
+        "y",
+        "y",
+        "40202",
+        "6.4 ohm",
+        "20",
+        "y",
+        "40201",
+        "6.4 mH",
+        "6.4 ohm",
+        "20",
+        "n",
+        "n",
+        "n",
+        "n",
+        "n",
+        "n",
+        "n",
+        "per_phase",
+    )
+    answer, out = asked(*LABELS, *wrong, *STATUS, *KEPT, "")
+    assert answer.exit_code == 0, answer.output
+    assert (
+        "no reading of register 40202 gives 6.4 ohm" in answer.output
+        and "is no stator resistance with its unit" in answer.output
+    )
+    assert load_profile(str(out)).items["stator_resistance"].address == 200

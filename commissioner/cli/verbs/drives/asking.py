@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
@@ -13,7 +13,8 @@ import click
 import typer
 
 from commissioner.errors import UsageError
-from commissioner.link.drive.ordinary.probing import Known
+from commissioner.link.drive.ordinary.probing import Known, Reading
+from commissioner.registers.contradictions import UNITS_OF_QUANTITY
 from commissioner.registers.convention import CIRCUITS, INDUCTANCES, RESISTANCES
 from commissioner.registers.status import STATUS_BITS
 
@@ -35,7 +36,15 @@ UNITS = {
 """As a keypad shows it -> the unit of a drive file, and what is one of it there."""
 STATOR, PHASES = "stator_resistance", ("per_phase", "line_to_line")
 
+NOT_SEEN = (
+    "tried as a holding register of u16, i16, u32 or f32, either word order, counted from 0, from 1 or as 4xxxx, scales of ten; a "
+    "value on the label may not be set in the drive, and input registers (3xxxx, function 4) are not read: look for the holding "
+    "register that shows the same"
+)
+
 Answer = TypeVar("Answer")
+See = Callable[[Known], Sequence[Reading]]
+"""Every way by which the drive shows a value that is known."""
 
 
 @dataclass(frozen=True)
@@ -91,13 +100,16 @@ class Answers:
         return (*self.labels, *(p.known for p in self.parameters))
 
 
-def answers() -> Answers:
-    """Asked on stderr. UsageError: too little to prove anything."""
+def answers(see: See) -> Answers:
+    """Asked on stderr; what `see` finds nowhere in the drive is asked again. UsageError: too little to prove anything."""
     name, source = text("Name of the drive"), text("Document or manual with its register table")
     labels = tuple(
-        Known(key, register(), value_in(unit), unit, page(source))
+        seen
         for key, (unit, words) in LABELS.items()
         if sure(f"Is the register of the {words} in the manual?")
+        and (
+            seen := _known(key, source, see, f"  its value in {unit}", lambda said, unit=unit: (above_zero(said), unit))
+        )
     )
     if len(labels) < FEWEST:
         raise UsageError(
@@ -106,37 +118,43 @@ def answers() -> Answers:
         )  # fmt: skip
     if not sure("Are registers of the motor's resistances, inductances or time constant in the manual?"):
         return Answers(name, source, labels)
-    parameters = _parameters(source)
+    parameters = _parameters(source, see)
     status, keeping, tuning = _status(source), _keeping(), ""
     if parameters:
         tuning = text("Page of its own tuning at standstill (empty: none)", default="")
     return Answers(name, source, labels, parameters, status, keeping, tuning)
 
 
-def _parameters(source: str) -> tuple[Parameter, ...]:
+def _known(name: str, source: str, see: See, words: str, read: Callable[[str], tuple[float, str]]) -> Known | None:
+    """A register and its value, once the drive has shown it; None: given up."""
+    while True:
+        printed, (value, unit) = register(), ask(words, read)
+        known = Known(name, printed, value, unit, page(source))
+        if see(known):
+            return known
+        typer.echo(f"  no reading of register {printed} gives {value:g} {unit}: {NOT_SEEN}", err=True)
+        if not sure("  Once more?"):
+            return None
+
+
+def _parameters(source: str, see: See) -> tuple[Parameter, ...]:
     """Each as the keypad shows it now, in the circuit of the manual."""
+    words = "  its value and unit, as the keypad shows it now (3.2 ohm, 13 mH)"
     asked = [
-        (
-            name,
-            register(),
-            ask("  its value and unit, as the keypad shows it now (3.2 ohm, 13 mH)", quantity),
-            page(source),
-        )
+        seen
         for name in PARAMETERS
-        if sure(f"  {name.replace('_', ' ')}?")
+        if sure(f"  {name.replace('_', ' ')}?") and (seen := _known(name, source, see, words, quantity_of(name)))
     ]
     if not asked:
         return ()
-    names = {name for name, *_ in asked}
+    names = {known.name for known in asked}
     circuit = choice("Circuit of these values", CIRCUITS) if names - {STATOR, "rotor_time_constant"} else CIRCUITS[0]
     counted = (
         choice("Stator resistance of one phase, or between two terminals", PHASES) if STATOR in names else PHASES[0]
     )
     return tuple(
-        Parameter(
-            Known(name, printed, value, shown, where), *UNITS[shown.lower()], _convention(name, shown, circuit, counted)
-        )
-        for name, printed, (value, shown), where in asked
+        Parameter(known, *UNITS[known.unit.lower()], _convention(known.name, known.unit, circuit, counted))
+        for known in asked
     )
 
 
@@ -210,10 +228,6 @@ def bit(said: str) -> int:
     raise typer.BadParameter(f"{said!r} is no bit: 0 is the lowest, 15 the highest")
 
 
-def value_in(unit: str) -> float:
-    return ask(f"  its value in {unit}", above_zero)
-
-
 def above_zero(said: str) -> float:
     """A value that proves something: zero stands in registers that nobody uses."""
     with suppress(ValueError):
@@ -223,10 +237,16 @@ def above_zero(said: str) -> float:
     raise typer.BadParameter(f"{said!r} is no value above zero: write it as 400 or 5.1")
 
 
-def quantity(said: str) -> tuple[float, str]:
-    """Number and unit."""
-    parts = re.fullmatch(r"\s*([\d.,]+)\s*([A-Za-zΩ%]+)\s*", said)
-    shown = parts[2].replace("Ω", "ohm") if parts else ""
-    if parts is None or shown.lower() not in UNITS:
-        raise typer.BadParameter(f"{said!r} is no value with its unit: write it as 3.2 ohm, 13 mH, 140 ms or 2.1 %")
-    return above_zero(parts[1]), shown
+def quantity_of(name: str) -> Callable[[str], tuple[float, str]]:
+    """Reads number and unit, as a keypad shows them, of a quantity that has such a unit."""
+
+    def read(said: str) -> tuple[float, str]:
+        parts = re.fullmatch(r"\s*([\d.,]+)\s*([A-Za-zΩ%]+)\s*", said)
+        shown = parts[2].replace("Ω", "ohm") if parts else ""
+        if parts is None or UNITS.get(shown.lower(), ("", 0.0))[0] not in UNITS_OF_QUANTITY[name]:
+            raise typer.BadParameter(
+                f"{said!r} is no {name.replace('_', ' ')} with its unit: write it as 3.2 ohm, 13 mH, 140 ms or 2.1 %"
+            )
+        return above_zero(parts[1]), shown
+
+    return read

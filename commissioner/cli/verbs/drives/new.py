@@ -33,8 +33,8 @@ def new_drive(url: str, out: Path, *, may_write: bool, as_json: bool) -> None:
             remedy="give another --out",
         )
     address = parse_url(url)
-    said = answers()
-    with closing(open_port(address, _bare(said.name))) as port:
+    with closing(open_port(address, _bare())) as port:
+        said = answers(lambda known: probing.readings(port, known))
         probed = _prove(port, said, may_write=may_write)
     text = text_of(said, probed, 1 if address.device is None else address.device)
     profile = build(tomllib.loads(text), str(out))
@@ -57,15 +57,6 @@ def new_drive(url: str, out: Path, *, may_write: bool, as_json: bool) -> None:
 
 def _prove(port: ModbusPort, said: Answers, *, may_write: bool) -> Probed:
     found = [probing.readings(port, known) for known in said.known]
-    for known, readings in zip(said.known, found, strict=True):
-        if not readings:
-            raise CheckFailed(
-                f"no reading of register {known.printed} gives {known.value:g} {known.unit}", step="prove the address base",
-                value=known.name, limit="a holding register of u16, i16, u32 or f32, either word order, counted from 0, from 1 or as "
-                "4xxxx, scales of ten",
-                remedy="check register and value; a value on the label may not be set in the drive; input registers (3xxxx, function 4) "
-                "are not read: look for the holding register that shows the same",
-            )  # fmt: skip
     agreed = probing.agreed(found)
     if agreed is None:
         raise CheckFailed(
@@ -115,12 +106,12 @@ def _see_at_rest(port: ModbusPort, status: Status, shift: int) -> None:
         )  # fmt: skip
 
 
-def _bare(name: str) -> DriveProfile:
+def _bare() -> DriveProfile:
     """Nothing is known but how to ask one register."""
     link = LinkLimits(
         max_read_registers=125, max_write_registers=2, has_read_write_multiple=False, turnaround_s=0.05, device_id=1
     )
     return DriveProfile(
-        file="new", name=name, kind="commercial", capabilities=frozenset(), status_decoder="none", link=link,
+        file="new", name="a new drive", kind="commercial", capabilities=frozenset(), status_decoder="none", link=link,
         identity=Identity(), items={},
     )  # fmt: skip
