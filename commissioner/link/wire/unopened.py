@@ -16,6 +16,9 @@ NO_ROUTE = frozenset({errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN})
 NO_SERIAL_PORT = frozenset({errno.ENOTTY, errno.ENODEV, errno.EISDIR})
 HANDSHAKE = "handshake operation timed out"
 """What Python's ssl says within a TimeoutError: something listens there and does not speak TLS."""
+OUT_OF_DATE = frozenset({9, 10})
+"""OpenSSL's X509_V_ERR_CERT_NOT_YET_VALID and X509_V_ERR_CERT_HAS_EXPIRED."""
+RENEW = "its certificate is out of date by this computer's clock: have it renewed, or set the clock"
 PARITIES = {"N": "no parity", "E": "even parity", "O": "odd parity"}
 
 
@@ -27,9 +30,17 @@ def unopened(url: DriveUrl, error: Exception, limit: str) -> LinkUnreachable:
     return LinkUnreachable(what, step="connect", value=str(error), limit=limit, remedy=remedy)
 
 
+def certificate_remedy(error: ssl.SSLCertVerificationError, otherwise: str) -> str:
+    """No other authority helps a certificate that is out of date."""
+    return RENEW if getattr(error, "verify_code", None) in OUT_OF_DATE else otherwise
+
+
 def _of_network(error: Exception) -> str:
     if isinstance(error, ssl.SSLCertVerificationError):
-        return "its certificate is not accepted: give its authority's PEM file as ca=FILE, and the host by a name that is in the certificate"
+        return certificate_remedy(
+            error,
+            "its certificate is not accepted: give its authority's PEM file as ca=FILE, and the host by a name that is in the certificate",
+        )
     if isinstance(error, ssl.SSLError) or HANDSHAKE in str(error):
         return "what listens there does not take our TLS: check the port and cert= and key=; without TLS it is tcp://HOST:PORT"
     if isinstance(error, socket.gaierror):

@@ -6,7 +6,7 @@ import tomllib
 import pytest
 
 from commissioner.cli.verbs.drives.asking import quantity_of
-from commissioner.errors import CheckFailed
+from commissioner.errors import CheckFailed, UsageError
 from commissioner.link.files.drive_file import load_profile
 from commissioner.registers.convention import our_values
 from tests.integration.link.test_ordinary_drives import NEW, PLATE, ask_new, inverter
@@ -128,6 +128,14 @@ def test_a_reactance_is_of_the_motor_on_the_label(tmp_path):
     assert answer.exit_code == 0, answer.output
     (worked,) = tomllib.loads(out.read_text("utf-8"))["worked"]
     assert worked["per_phase"] == pytest.approx(20 / (100 * math.pi)) and worked["rated_frequency_hz"] == 50.0
+
+
+def test_a_drive_that_says_nothing_at_all_is_told_from_one_without_the_value(tmp_path):
+    with LibmodbusDrive(*DRIVE, "--delay", "1500") as drive:
+        drive.url += ("&" if "?" in drive.url else "?") + "reply=0.02"
+        answer = ask_new(drive, tmp_path / "x.toml", *LABELS[:6], "n", "n", "n", "n", "n", "n")
+    assert "no answer to 'read 1 registers at 40101'" in answer.output and "no reading of" not in answer.output
+    assert isinstance(answer.exception, UsageError)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import TypeVar
 import click
 import typer
 
-from commissioner.errors import UsageError
+from commissioner.errors import LinkError, UsageError
 from commissioner.link.drive.ordinary.probing import Known, Reading
 from commissioner.registers.contradictions import UNITS_OF_QUANTITY
 from commissioner.registers.convention import CIRCUITS, INDUCTANCES, RESISTANCES
@@ -130,9 +130,13 @@ def _known(name: str, source: str, see: See, words: str, read: Callable[[str], t
     while True:
         printed, (value, unit) = register(), ask(words, read)
         known = Known(name, printed, value, unit, page(source))
-        if see(known):
-            return known
-        typer.echo(f"  no reading of register {printed} gives {value:g} {unit}: {NOT_SEEN}", err=True)
+        why = f"no reading of register {printed} gives {value:g} {unit}: {NOT_SEEN}"
+        try:
+            if see(known):
+                return known
+        except LinkError as silent:
+            why = f"{silent.what}: {silent.remedy}"
+        typer.echo(f"  {why}", err=True)
         if not sure("  Once more?"):
             return None
 
