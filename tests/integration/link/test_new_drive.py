@@ -134,7 +134,7 @@ def test_a_drive_that_says_nothing_at_all_is_told_from_one_without_the_value(tmp
     with LibmodbusDrive(*DRIVE, "--delay", "1500") as drive:
         drive.url += ("&" if "?" in drive.url else "?") + "reply=0.02"
         answer = ask_new(drive, tmp_path / "x.toml", *LABELS[:6], "n", "n", "n", "n", "n", "n")
-    assert "no answer to 'read 1 registers at 40101'" in answer.output and "no reading of" not in answer.output
+    assert "no answer to 'read" in answer.output and "no reading of" not in answer.output
     assert isinstance(answer.exception, UsageError)
 
 

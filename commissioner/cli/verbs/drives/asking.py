@@ -107,9 +107,7 @@ def answers(see: See) -> Answers:
         seen
         for key, (unit, words) in LABELS.items()
         if sure(f"Is the register of the {words} in the manual?")
-        and (
-            seen := _known(key, source, see, f"  its value in {unit}", lambda said, unit=unit: (above_zero(said), unit))
-        )
+        and (seen := _known(key, source, see, f"  its value in {unit}", value_in(unit)))
     )
     if len(labels) < FEWEST:
         raise UsageError(
@@ -239,6 +237,11 @@ def above_zero(said: str) -> float:
         if 0.0 < value < math.inf:
             return value
     raise typer.BadParameter(f"{said!r} is no value above zero: write it as 400 or 5.1")
+
+
+def value_in(unit: str) -> Callable[[str], tuple[float, str]]:
+    """Reads a number of this unit."""
+    return lambda said: (above_zero(said), unit)
 
 
 def quantity_of(name: str) -> Callable[[str], tuple[float, str]]:
