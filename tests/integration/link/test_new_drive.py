@@ -6,7 +6,8 @@ import tomllib
 import pytest
 
 from commissioner.cli.verbs.drives.asking import quantity_of
-from commissioner.errors import CheckFailed, UsageError
+from commissioner.errors import CheckFailed, ReplyTimeout, RequestRefused
+from commissioner.link.drive.ordinary.probing import Known, readings
 from commissioner.link.files.drive_file import load_profile
 from commissioner.registers.convention import our_values
 from tests.integration.link.test_ordinary_drives import NEW, PLATE, ask_new, inverter
@@ -130,12 +131,22 @@ def test_a_reactance_is_of_the_motor_on_the_label(tmp_path):
     assert worked["per_phase"] == pytest.approx(20 / (100 * math.pi)) and worked["rated_frequency_hz"] == 50.0
 
 
-def test_a_drive_that_says_nothing_at_all_is_told_from_one_without_the_value(tmp_path):
-    with LibmodbusDrive(*DRIVE, "--delay", "1500") as drive:
-        drive.url += ("&" if "?" in drive.url else "?") + "reply=0.02"
-        answer = ask_new(drive, tmp_path / "x.toml", *LABELS[:6], "n", "n", "n", "n", "n", "n")
-    assert "no answer to 'read" in answer.output and "no reading of" not in answer.output
-    assert isinstance(answer.exception, UsageError)
+class Silent:
+    """A line on which nobody answers, but for one refusal where `refuses`."""
+
+    def __init__(self, refuses):
+        self.refuses = refuses
+
+    def read(self, address, count):
+        kind = RequestRefused if self.refuses and count == 1 else ReplyTimeout
+        raise kind("no answer to it", step="read", value=2, limit="an answer", remedy="check the cable")
+
+
+def test_a_drive_that_says_nothing_at_all_is_told_from_one_without_the_value():
+    known = Known("rated_voltage_v", 40101, 400.0, "V", "p. 12")
+    assert readings(Silent(refuses=True), known) == []
+    with pytest.raises(ReplyTimeout):
+        readings(Silent(refuses=False), known)
 
 
 @pytest.mark.parametrize(
