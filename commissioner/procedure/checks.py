@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 from commissioner.errors import CheckFailed
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.link_plan import StreamPace, least_baud, plan_link
+from commissioner.procedure.link_plan import LONGEST_REQUEST_S, StreamPace, least_baud, plan_link
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.status import DriveState
 
@@ -164,6 +164,8 @@ def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[Check
     plan = plan_link(pace, sample_period_s)
     is_kept = plan is None or pace.is_kept(plan, sample_period_s)
     slow = f" at best, {1e3 * pace.slowest_s:.3g} ms at worst" if pace.slowest_s > UNEVEN * pace.round_trip_s else ""
+    if not pace.can_steer:
+        slow += f", {1e3 * pace.request_s:.3g} ms for the shortest request,"
     took, rate = (
         f"{1e3 * pace.round_trip_s:.3g} ms{slow} for {pace.samples} samples",
         f"{1.0 / sample_period_s:.0f} samples a second",
@@ -175,7 +177,7 @@ def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[Check
         took if plan is None or not plan.is_reduced else f"{took}: {plan.sentence(sample_period_s)}",
         limit
         if plan is not None and not plan.is_reduced
-        else f"{limit}; slower with means, or with samples kept in the drive",
+        else f"{limit}; slower with means, or with samples kept in the drive; {1e3 * LONGEST_REQUEST_S:.3g} ms for a short request",
         "use a link that answers sooner and evenly: a cable in place of radio, VPN or gateway; a serial line of "
         f"{least_baud(pace, sample_period_s, is_reduced=plan is None):.0f} Bd or more",
     )

@@ -24,6 +24,9 @@ EASE = 2.0
 """Means of levels are longer than the link asks for by this: shorter windows, and steering is answered sooner."""
 KEPT_SAMPLE_S, LONGEST_TEST_S = 1e-3, 7.0
 """Means that are kept in the drive, where its memory holds the longest test of them."""
+LONGEST_REQUEST_S = 0.12
+"""A staircase of direct current waits for about a hundred answers: 12 s of the 16 s that the drive allows one test. At 150 ms a request
+it took 15.0 s with nothing else on the host, and the drive ended it otherwise."""
 HIGHEST_TONE = 0.05
 """Of the sampling frequency: the highest tone of a test (`identify.excite.tones`)."""
 
@@ -32,8 +35,8 @@ HIGHEST_TONE = 0.05
 class StreamPace:
     """What the link carries: the fastest of a few reads of a whole sample window, made before anything is energised, the
     samples (all channels) and registers of one window, those of its data, the longest mean the drive makes, in control
-    periods, the samples its memory keeps, and the slowest of those reads: what a busy host adds now and then is caught up
-    with from the drive's memory, and must fit there."""
+    periods, the samples its memory keeps, the slowest of those reads: what a busy host adds now and then is caught up
+    with from the drive's memory, and must fit there; and the fastest answer of any length."""
 
     round_trip_s: float
     samples: int
@@ -42,6 +45,12 @@ class StreamPace:
     most_averaged: int = 1
     kept_samples: int = 0
     slowest_s: float = 0.0
+    request_s: float = 0.0
+
+    @property
+    def can_steer(self) -> bool:
+        """Whether direct current can be steered to its levels within the time that a test may take."""
+        return self.request_s <= LONGEST_REQUEST_S
 
     def window_s(self, mean: float, control_period_s: float) -> float:
         """In which the link must pass a window of two currents, each sample the mean of so many control periods."""
@@ -104,6 +113,8 @@ def plan_link(pace: StreamPace | None, control_period_s: float) -> LinkPlan | No
     """The least reduction that the link carries; None where it carries none. Without a pace nothing is reduced."""
     if pace is None or pace.round_trip_s <= pace.samples * control_period_s:
         return LinkPlan()
+    if not pace.can_steer:
+        return None
     least = pace.least_mean(control_period_s)
     if least <= pace.longest_mean(LONGEST_SAMPLE_S, control_period_s):
         return LinkPlan(TWO_CURRENTS, max(1, math.ceil(least - 1e-9)))

@@ -26,6 +26,8 @@ from commissioner.run.archive.folder import RunFolder
 
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
+SLOW_SHARE = 0.25
+"""Of the watchdog's time: an answer that takes as long is slower than any that the watchdog was armed for."""
 
 
 def let_go(inverter: Inverter) -> DisarmReport:
@@ -103,6 +105,16 @@ def with_host(error: CommissionerError, gap_s: float, watchdog_s: float | None) 
     if isinstance(error, DriveError) and watchdog_s is not None and gap_s >= LATE_SHARE * watchdog_s:
         error.what += f"; this host was late: {gap_s:.2g} s passed between an answer and its next request"
         error.remedy = f"end other programs on this host, or use one that is less busy; {error.remedy}"
+    return error
+
+
+def with_link(error: CommissionerError, answer_s: float, watchdog_s: float | None) -> CommissionerError:
+    """What broke while energised, and that the link was slow: its slowest answer took a good part of what the drive's watchdog grants."""
+    if isinstance(error, DriveFault) and watchdog_s is not None and answer_s >= SLOW_SHARE * watchdog_s:
+        error.what += f"; the link was slow: an answer took {answer_s:.2g} s"
+        error.remedy = (
+            f"use a link that answers sooner and evenly: a cable in place of radio, VPN or gateway; {error.remedy}"
+        )
     return error
 
 

@@ -99,7 +99,9 @@ def _pace(inverter: Inverter, now_s: Callable[[], float]) -> StreamPace | None:
         except RequestRefused:
             return None
         times_s.append(now_s() - began_s)
-    return StreamPace(max(min(times_s), at_least_s), *window, slowest_s=max(*times_s, at_least_s))
+    return StreamPace(
+        max(min(times_s), at_least_s), *window, slowest_s=max(*times_s, at_least_s), request_s=port.stats.latency_s(0.0)
+    )
 
 
 def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:

@@ -26,6 +26,7 @@ from commissioner.run.ending import (
     still_live,
     taken_as_live,
     with_host,
+    with_link,
     with_master,
     write_lost,
 )
@@ -100,7 +101,7 @@ class Runner:
             try:
                 ended = self._drive(course)
             except CommissionerError as failure:
-                error = self._with_host(failure)
+                error = self._explained(failure)
             except Exception as surprise:  # must not leave a motor energised or a run without an end
                 error = as_error(surprise, self._folder)
             finally:
@@ -231,9 +232,13 @@ class Runner:
         sensors = SensorWatch(limits.current_a if limits else math.inf)
         self._stream = Stream(self._inverter, cursor, began_s, sensors, self._watch)
 
-    def _with_host(self, error: CommissionerError) -> CommissionerError:
-        facts = self._progress.facts
-        return with_host(error, self._inverter.port.stats.longest_gap_s, facts.watchdog_s) if facts.energised else error
+    def _explained(self, error: CommissionerError) -> CommissionerError:
+        facts, stats = self._progress.facts, self._inverter.port.stats
+        if not facts.energised:
+            return error
+        return with_link(
+            with_host(error, stats.longest_gap_s, facts.watchdog_s), stats.latency_s(1.0), facts.watchdog_s
+        )
 
     def _fetch(self) -> SampleBlock | None:
         """The next block, archived and judged; None once the drive has ended the session."""

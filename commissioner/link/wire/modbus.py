@@ -34,11 +34,12 @@ EXCEPTION_MEANINGS = {
     4: "device failure",
     5: "acknowledged, still at work",
     6: "device busy",
+    7: "negative acknowledge: it cannot carry this out",
     8: "memory parity error",
     10: "gateway path unavailable",
     11: "gateway target did not answer",
 }
-"""MODBUS Application Protocol Specification V1.1b3, section 7."""
+"""MODBUS Application Protocol Specification V1.1b3, section 7; 7: Modicon's PI-MBUS-300 reference guide, appendix A."""
 NOT_CARRIED_OUT = frozenset({6, 10})
 """Busy, or no way to the device: asked again, whatever it was, until the time for a reply is over."""
 BUSY_PAUSE_S = 0.01

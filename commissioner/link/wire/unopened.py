@@ -12,9 +12,13 @@ from commissioner.link.wire.url import DriveUrl, RtuUrl
 
 NOT_OURS = frozenset({errno.EACCES, errno.EPERM, errno.EBUSY, errno.EAGAIN})
 """The port is there and this user may not open it, or another program holds it."""
+NO_ROUTE = frozenset({errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN})
 NO_SERIAL_PORT = frozenset({errno.ENOTTY, errno.ENODEV, errno.EISDIR})
 HANDSHAKE = "handshake operation timed out"
 """What Python's ssl says within a TimeoutError: something listens there and does not speak TLS."""
+OUT_OF_DATE = frozenset({9, 10})
+"""OpenSSL's X509_V_ERR_CERT_NOT_YET_VALID and X509_V_ERR_CERT_HAS_EXPIRED."""
+RENEW = "its certificate is out of date by this computer's clock: have it renewed, or set the clock"
 PARITIES = {"N": "no parity", "E": "even parity", "O": "odd parity"}
 
 
@@ -26,15 +30,25 @@ def unopened(url: DriveUrl, error: Exception, limit: str) -> LinkUnreachable:
     return LinkUnreachable(what, step="connect", value=str(error), limit=limit, remedy=remedy)
 
 
+def certificate_remedy(error: ssl.SSLCertVerificationError, otherwise: str) -> str:
+    """No other authority helps a certificate that is out of date."""
+    return RENEW if getattr(error, "verify_code", None) in OUT_OF_DATE else otherwise
+
+
 def _of_network(error: Exception) -> str:
     if isinstance(error, ssl.SSLCertVerificationError):
-        return "its certificate is not accepted: give its authority's PEM file as ca=FILE, and the host by a name that is in the certificate"
+        return certificate_remedy(
+            error,
+            "its certificate is not accepted: give its authority's PEM file as ca=FILE, and the host by a name that is in the certificate",
+        )
     if isinstance(error, ssl.SSLError) or HANDSHAKE in str(error):
         return "what listens there does not take our TLS: check the port and cert= and key=; without TLS it is tcp://HOST:PORT"
     if isinstance(error, socket.gaierror):
         return "this name is not known here: give the drive's number, as tcp://192.168.0.20:502"
     if isinstance(error, ConnectionRefusedError):
         return "nothing listens on this port there: check that Modbus TCP is switched on in the drive, the port, the address and the cable"
+    if isinstance(error, OSError) and error.errno in NO_ROUTE:
+        return "this computer has no way to that address: check the address, the cable and the network settings of this computer"
     return "check that the drive is powered, the cable, the address and that no other master holds it"
 
 

@@ -161,7 +161,7 @@ def _options(text: str, parts: SplitResult, known: tuple[str, ...]) -> dict[str,
 def _host(text: str, parts: SplitResult) -> str:
     if not parts.hostname or parts.path not in ("", "/"):
         raise _refuse(text, parts.path or "no host", f"{parts.scheme}://HOST:PORT")
-    return parts.hostname
+    return parts.hostname.replace("%25", "%")  # RFC 6874: how the zone of fe80::1%eth0 stands in an address
 
 
 def _port(text: str, parts: SplitResult, default: int) -> int:

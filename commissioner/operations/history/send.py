@@ -15,6 +15,7 @@ from urllib.parse import quote
 
 from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, UsageError
+from commissioner.link.wire.unopened import certificate_remedy
 from commissioner.operations.history.share import (
     CONFLICT,
     CONFLICTING,
@@ -145,8 +146,11 @@ class _Service:
             raise CommissionerError(
                 f"the service's certificate is not trusted: {failure.verify_message}", step="push", value=self._url,
                 limit="a certificate of this name from an authority that this computer knows, or of --ca",
-                remedy="give --ca FILE with the certificate of who vouches for it, as whoever set up the service has it; take the address that "
-                "the certificate is made out to",
+                remedy=certificate_remedy(
+                    failure,
+                    "give --ca FILE with the certificate of who vouches for it, as whoever set up the service has it; take the address that "
+                    "the certificate is made out to",
+                ),
             ) from failure  # fmt: skip
         except (OSError, http.client.HTTPException, ValueError) as failure:
             raise CommissionerError(

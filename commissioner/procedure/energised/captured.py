@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Generator
 from typing import Any
 
-from commissioner.errors import Aborted
+from commissioner.errors import Aborted, DriveFault
 from commissioner.procedure.energised.ceilings import for_tones
 from commissioner.procedure.energised.multitone import UnderTest
-from commissioner.procedure.energised.session import OFFSET_S, load, next_block
+from commissioner.procedure.energised.session import OFFSET_S, load, next_block, tone_period_s
 from commissioner.procedure.findings import AxisFinished, StepProgress
 from commissioner.procedure.steps import Findings, Job
 from commissioner.records import DriveStatus
@@ -22,6 +22,8 @@ from commissioner.safety.commands import Command, Disarm, Enable, ReadStatus, Se
 
 PART_S = 1.0
 """Told as progress about as often."""
+AT_LEAST = 0.5
+"""Of a test's time: what the samples that the drive made of it must cover."""
 
 
 def captured(
@@ -53,7 +55,7 @@ def captured(
     yield SetScale(0.0)
     yield from _pass(ramp_s, step, axis_deg)
     yield Disarm("test done")
-    lost = yield from _download(findings, step, axis_deg)
+    lost = yield from _download(findings, step, axis_deg, OFFSET_S + seconds + ramp_s)
     why = "judged by the fit of its samples"
     yield Tell(AxisFinished(axis_deg, is_look, seconds, False, why, findings.peak_flux_fraction, lost))
 
@@ -67,9 +69,17 @@ def _pass(seconds: float, step: str, axis_deg: float) -> Generator[Command, Any,
         )  # fmt: skip
 
 
-def _download(findings: Findings, step: str, axis_deg: float) -> Generator[Command, Any, int]:
-    """All that the drive has kept of the session; how many samples it had lost."""
+def _download(findings: Findings, step: str, axis_deg: float, seconds: float) -> Generator[Command, Any, int]:
+    """All that the drive has kept of the session; how many samples it had lost. DriveFault: it made too few for its `seconds`."""
     status: DriveStatus = yield ReadStatus()
+    made_s = status.samples_produced * tone_period_s(findings)
+    if made_s < AT_LEAST * seconds:
+        raise DriveFault(
+            f"the drive made samples of {made_s:.2g} s in a test of {seconds:.2g} s", step=f"{step}, axis {axis_deg:g} deg",
+            value=made_s, unit="s", limit=AT_LEAST * seconds,
+            remedy="its time does not pass as ours does: check decimation and control period of the firmware; a simulated "
+            "inverter behind a slow link must run in real time (--speed 1)",
+        )  # fmt: skip
     got, lost = 0, 0
     while got < status.samples_produced:
         block = yield from next_block(findings, step, axis_deg)

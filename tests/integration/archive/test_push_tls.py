@@ -1,5 +1,9 @@
 """Runs to a service that speaks https: whom the laptop believes, and what it says where it does not."""
 
+import ssl
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
 import pytest
 
 from commissioner.run.archive.verify import verify
@@ -61,6 +65,18 @@ def test_nothing_is_sent_to_a_service_nobody_vouches_for(service, authority, pus
     assert error["what"].startswith("the service's certificate is not trusted: ")
     assert any(word in error["what"] for word in why.split("|")), error
     assert "--ca FILE" in error["remedy"]
+
+
+def test_a_certificate_that_is_out_of_date_is_said_so(authority, push):
+    pushed, _ = push
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(*authority.issue("yesterdays", ["127.0.0.1"], days=-1))
+    with HTTPServer(("127.0.0.1", 0), BaseHTTPRequestHandler, bind_and_activate=True) as late:
+        late.socket = context.wrap_socket(late.socket, server_side=True)
+        threading.Thread(target=late.handle_request, daemon=True).start()
+        done = pushed(f"https://127.0.0.1:{late.server_port}", "--ca", authority.file)
+    assert done.code == 5 and "expired" in done.json["error"]["what"]
+    assert "out of date" in done.json["error"]["remedy"] and "--ca" not in done.json["error"]["remedy"]
 
 
 def test_a_file_that_is_no_certificate_is_a_usage_error(service, push, tmp_path):

@@ -336,7 +336,7 @@ LABELS = (
 def test_a_new_drive_file_holds_what_the_drive_proved_and_nothing_else(tmp_path):
     out = tmp_path / "new.toml"
     with LibmodbusDrive(*DANFOSS, "--max-read", "2", "--functions", "3,16") as drive:
-        answer = ask_new(drive, out, *LABELS, "y", options=("--probe-writes",))
+        answer = ask_new(drive, out, *LABELS, "n", "y", options=("--probe-writes",))
     assert answer.exit_code == 0, answer.output
     profile = load_profile(str(out))
     assert {n: (i.address, i.type, i.scale) for n, i in profile.items.items()} == {
@@ -368,7 +368,7 @@ def test_registers_printed_with_their_tables_number_are_found(tmp_path, table):
         "p. 1",
     )
     with LibmodbusDrive(*DANFOSS) as drive:
-        answer = ask_new(drive, out, *lines, "n", "n", "n", "n")
+        answer = ask_new(drive, out, *lines, "n", "n", "n", "n", "n")
     assert answer.exit_code == 0, answer.output
     assert "P1.01" in answer.output and "the rest is [unknown] in it" in answer.output.replace("\n", " ")
     items = load_profile(str(out)).items
@@ -378,8 +378,8 @@ def test_registers_printed_with_their_tables_number_are_found(tmp_path, table):
 def test_labels_that_are_not_in_the_registers_named_make_no_drive_file(tmp_path):
     out = tmp_path / "new.toml"
     with LibmodbusDrive(*DANFOSS) as drive:
-        answer = ask_new(drive, out, *LABELS[:4], "p. 1", "y", "1240", "7.3", "p. 1", "n", "n", "n", "n")
-    assert isinstance(answer.exception, CheckFailed | SystemExit) and not out.exists()
+        answer = ask_new(drive, out, *LABELS[:6], "y", "1240", "7.3", "p. 1", "n", "n", "n", "n", "n")
+    assert isinstance(answer.exception, UsageError) and not out.exists()
     assert not [r for r in drive.truth["requests"] if r[0] in (5, 6, 16)]
 
 

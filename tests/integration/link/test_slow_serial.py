@@ -55,3 +55,9 @@ def test_a_run_at_19200_captures_downloads_and_is_true_within_three_of_its_error
     assert run.overruns == 0 and run.findings.identification.lost_samples == 0
     assert np.max(np.abs(run.errors_in_std)) < 3.0
     assert run.station.highest_flux_wb < run.findings.flux_limit_wb
+
+
+def test_150_ms_a_request_are_refused_before_anything_is_energised(tmp_path):
+    run = commissioned(tmp_path, Pace(10_000_000, 0.150))
+    assert run.ended.outcome == "rejected" and run.ended.energised_s == 0.0
+    assert "the link keeps up with the samples" in run.ended.reason

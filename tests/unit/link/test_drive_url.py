@@ -14,6 +14,8 @@ from commissioner.link.wire.url import RtuUrl, TcpUrl, TlsUrl, parse_url, withou
         ("tcp://192.168.0.7:1502?device=3", TcpUrl("192.168.0.7", 1502, 3)),
         ("tcp://drive.local", TcpUrl("drive.local", 502, None)),
         ("tcp://[::1]:5020/", TcpUrl("::1", 5020, None)),
+        ("tcp://[fe80::1%25eth0]", TcpUrl("fe80::1%eth0", 502, None)),
+        ("tcp://[fe80::1%eth0]", TcpUrl("fe80::1%eth0", 502, None)),
         ("tls://drive", TlsUrl("drive", 802)),
         ("rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1", RtuUrl("/dev/ttyUSB0", 115200, "E", 1, 1)),
         ("rtu:///dev/ttyUSB0", RtuUrl("/dev/ttyUSB0", 19200, "E", 1, None)),

@@ -66,7 +66,12 @@ def test_each_is_told_in_german_too():
         for error in errors:
             failure = unopened(parse_url(f"rtu://{path}?parity=N"), error, "an open line")
             assert Texts("de").knows(failure.what) and Texts("de").knows(failure.remedy)
-    for error in (socket.gaierror(-2, "x"), ConnectionRefusedError(111, "x"), TimeoutError("x")):
+    for error in (
+        socket.gaierror(-2, "x"),
+        ConnectionRefusedError(111, "x"),
+        OSError(errno.ENETUNREACH, "x"),
+        TimeoutError("x"),
+    ):
         assert Texts("de").knows(unopened(parse_url("tcp://drive:502"), error, "an open line").remedy)
 
 

@@ -114,6 +114,18 @@ def test_a_link_that_carries_no_plan_is_refused_and_an_unmeasured_one_is_not():
     assert plan_link(None, 2e-4) == LinkPlan()
 
 
+def test_a_link_of_150_ms_a_request_is_refused_by_its_name_before_anything_is_energised():
+    """It carries the samples, and a staircase over it outlasts what the drive allows a test."""
+    carried = StreamPace(0.11, 29, 125, 117, 100, 20000, 0.11, 0.11)
+    assert plan_link(carried, 2e-4).captured
+    slow = replace(carried, round_trip_s=0.15, slowest_s=0.15, request_s=0.15)
+    assert plan_link(slow, 2e-4) is None
+    results = judge_drive(replace(IDENTITY, control_period_s=2e-4), (STATUS, STATUS), {}, PLATE, LIMITS, 6.4, slow)
+    (seen,) = [result for result in results if result.name == "the link keeps up with the samples"]
+    assert not seen.has_passed
+    assert "150 ms for the shortest request" in seen.value and "120 ms for a short request" in seen.limit
+
+
 def test_a_late_answer_is_told_and_refused_where_the_drive_does_not_keep_what_it_holds_up():
     def seen(slowest_s):
         pace = StreamPace(0.0057, 29, 125, 117, 100, 500, slowest_s)

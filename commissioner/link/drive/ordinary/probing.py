@@ -58,17 +58,27 @@ class Blocks:
 
 
 def readings(port: ModbusPort, known: Known) -> list[Reading]:
-    """Every type, word order, scale and shift of the address by which the drive shows the label's value."""
-    out = []
+    """Every type, word order, scale and shift of the address by which the drive shows the label's value. LinkError: it says nothing at
+    all, no refusal either."""
+    out: list[Reading] = []
+    silence: LinkError | None = None
+    has_spoken = False
     for item, shift in _forms(known):
         try:
             words = port.read(item.address, item.words)
-        except LinkError:
+        except RequestRefused:
+            has_spoken = True
             continue
+        except LinkError as silent:
+            silence = silent
+            continue
+        has_spoken = True
         raw = number(decode_item(item, words))
         for scale in SCALES:
             if abs(raw * scale - known.value) <= SAME * abs(known.value):
                 out.append(Reading(replace(item, scale=scale), shift, raw * scale))
+    if silence is not None and not has_spoken:
+        raise silence
     return out
 
 
