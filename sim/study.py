@@ -13,7 +13,7 @@ import numpy as np
 from sim.physics.effects import CATALOGUE
 from sim.physics.inductance import inverse_gamma
 from sim.scenario import Scenario, ScenarioError, build, motor_of, read_document, table_machine, table_rows
-from sim.truth import apparent_resistance_ohm, sensor_gain
+from sim.truth import apparent_resistance_ohm, link_gain, sensor_gain
 from sim.wire.faults import FaultError
 from sim.wire.in_process import Station
 
@@ -44,12 +44,12 @@ class Drawn:
 
     def parameters_at(self, stator_flux_wb: float, axes_deg: Sequence[float]) -> Mapping[str, float]:
         """Secant inverse-Gamma values at a peak stator flux, as they are at the drive's terminals and through its sensors along
-        these axes: the stator's resistance with that of the devices, and every impedance over the sensors' gain, for nothing that
-        the drive measures tells either apart."""
+        these axes: the stator's resistance with that of the devices, and every impedance over the gain of the sensors and of the
+        link, for nothing that the drive measures tells any of them apart."""
         plant = self.station.scenario.plant
         secant = inverse_gamma(plant, stator_flux_wb)
         truth = {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
-        gain = sensor_gain(plant, axes_deg)
+        gain = sensor_gain(plant, axes_deg) * link_gain(plant)
         return {name: value / gain for name, value in truth.items()}
 
 

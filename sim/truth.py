@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from sim.physics import effects
 from sim.physics import layout as at
 from sim.physics.inductance import inverse_gamma, saturated
-from sim.physics.kernel import load
+from sim.physics.kernel import link_voltage, load
 from sim.physics.laws import sign_law
 from sim.physics.machine import Plant
 from sim.physics.packing import pack
@@ -50,6 +50,13 @@ def answer_key(scenario: Scenario, seed: int = 0) -> dict[str, Any]:
             )
         ),
     }
+
+
+def link_gain(plant: Plant) -> float:
+    """What comes out of what is commanded, in the mean over the rectifier's ripple: a sawtooth's mean is not the nominal link."""
+    p, _ = pack(plant)
+    times = np.arange(1000) / 1000.0 / p[at.P_RIPPLE_HZ]
+    return float(np.mean([link_voltage(t, 0.0, p) for t in times]) / p[at.P_LINK_NOMINAL_V])
 
 
 def apparent_resistance_ohm(plant: Plant) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from commissioner.identify.estimate.axes import REPEATABILITY, Identity
+from commissioner.identify.estimate.axes import Identity
 from commissioner.identify.estimate.common_ground import CommonGround, Result
 
 Array = NDArray[np.float64]
@@ -46,10 +46,10 @@ def explain(
     old: Result, new: Result, moved: tuple[Array, Array], common: CommonGround, verdict: Identity
 ) -> tuple[Explanation, ...]:
     """The simplest causes that suffice, the most probable first; empty where nothing has moved or nothing suffices. `moved`:
-    differences of the parameters' logarithms on common ground `(4,)`, and their standard errors without repeatability."""
+    differences of the parameters' logarithms on common ground `(4,)`, and their standard errors at one temperature."""
     difference, std = moved
-    weight = 1.0 / (std**2 + np.square(REPEATABILITY))
-    if verdict is Identity.SAME or float(chdtrc(4, np.sum(weight * difference**2))) > REST:
+    weight = std**-2
+    if verdict is Identity.SAME:
         return ()
     found = [made for one in _directions(old, new, common) if (made := _fit(one, difference, weight)) is not None]
     if verdict is Identity.OTHER:
@@ -69,7 +69,11 @@ def _fit(direction: _Direction, difference: Array, weight: Array) -> Explanation
     if probability < REST or not direction.within[0] <= relative <= direction.within[1]:
         return None
     return Explanation(
-        direction.cause, relative, bound**-0.5, probability, f"{direction.sentence}: {100 * relative:+.2g} %"
+        direction.cause,
+        relative,
+        (1.0 + relative) * bound**-0.5,
+        probability,
+        f"{direction.sentence}: {100 * relative:+.2g} %",
     )
 
 

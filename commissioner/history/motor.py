@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.history.series import FALSE_ALARM, Array, Judged, judge
-from commissioner.identify.estimate.axes import REPEATABILITY, RESISTANCE_PER_K, TEMPERATURE_K
+from commissioner.identify.estimate.axes import TEMPERATURE_K, scatter
 from commissioner.identify.estimate.common_ground import CommonGround, Result, at_one_flux, at_temperature
 from commissioner.motor.circuit import PARAMETERS, QUANTILE
 
@@ -80,7 +80,7 @@ class Trends:
 
 def motor_trends(measured: Sequence[Measured], *, false_alarm: float = FALSE_ALARM) -> Trends:
     """At least one result, in order of time. L_M at the lowest flux of all; resistances at the first known winding temperature, those
-    of runs that know none with what 25 K make as noise."""
+    of runs that know none with that as noise (`scatter`)."""
     results, flux_wb, said = at_one_flux([one.result for one in measured])
     degc = next((result.winding_degc for result in results if result.winding_degc is not None), None)
     of = next((result.name for result in results if result.winding_degc is not None), "")
@@ -89,13 +89,11 @@ def motor_trends(measured: Sequence[Measured], *, false_alarm: float = FALSE_ALA
         for result in results
     ]
     time = np.array([one.time_s for one in measured])
+    noise = np.array([scatter(result.combined, result.winding_degc is not None) for result in moved])
     trends = []
     for k, name in enumerate(PARAMETERS):
         value = np.array([result.combined.parameters.as_tuple()[k] for result in moved])
-        claimed = np.array([math.sqrt(result.combined.covariance[k, k]) for result in moved]) / value
-        heat = RESISTANCE_PER_K * TEMPERATURE_K * (1.0 if k < 2 else 0.0)
-        unknown = np.array([heat if result.winding_degc is None else 0.0 for result in results])
-        std = np.sqrt(claimed**2 + REPEATABILITY[k] ** 2 + unknown**2)
+        std = noise[:, k]
         judged = _judged(time, np.log(value), std, len(PARAMETERS), false_alarm)
         trends.append(_relative(name, measured, value, std, judged))
     sentences = [*said, *_heat_sentences(results, degc)]
@@ -156,11 +154,11 @@ def _trend(
 def _heat_sentences(results: Sequence[Result], degc: float | None) -> list[str]:
     unknown = sum(result.winding_degc is None for result in results)
     if degc is None:
-        return [f"no winding temperature is known: resistances carry what {TEMPERATURE_K:g} K make as noise"]
+        return [f"no winding temperature is known: resistances may differ by what {TEMPERATURE_K:g} K make"]
     said = [f"resistances are shown at {degc:.3g} °C, the rotor taken to be as warm as the winding"]
     if unknown:
         said.append(
-            f"{unknown} of {len(results)} runs know no winding temperature: their resistances carry what {TEMPERATURE_K:g} K make as noise"
+            f"{unknown} of {len(results)} runs know no winding temperature: their resistances may differ by what {TEMPERATURE_K:g} K make"
         )
     return said
 

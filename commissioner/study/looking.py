@@ -27,7 +27,7 @@ def _identified(path: Path) -> dict[str, Any]:
     from commissioner.operations.recordings.identify import IdentifyRequest, identify
 
     document: Any = identify(IdentifyRequest((path,))).document
-    told = {"outcome": document["outcome"], "reason": document["reason"]}
+    told = {"outcome": document["outcome"], "reason": document["reason"], "remarks": "\n".join(document["remarks"])}
     for name in PARAMETERS:
         measured = (document.get("parameters") or {}).get(name, {})
         told |= {f"{name}_value": measured.get("value"), f"{name}_std": measured.get("std")}
@@ -42,6 +42,7 @@ def _diagnosed(path: Path) -> dict[str, Any]:
     return {
         "outcome": document["verdict"],
         "reason": document["reason"],
+        "remarks": "\n".join(document.get("audit", [])),
         "causes": causes,
         "held_out": document["gain"]["held_out"],
     }
@@ -52,6 +53,7 @@ def _monitored(path: Path) -> dict[str, Any]:
 
     document: Any = monitor(MonitorRequest(path)).document
     return {
-        "outcome": "monitored", "mean_speed_rad_per_s": document["mean_speed_rad_per_s"],
+        "outcome": "monitored", "remarks": "\n".join(finding["what"] for finding in document["audit"]["findings"]),
+        "mean_speed_rad_per_s": document["mean_speed_rad_per_s"],
         "mean_torque_nm": document["mean_torque_nm"],
     }  # fmt: skip

@@ -21,7 +21,8 @@ DEFECT = "defect"
 
 class Row(TypedDict):
     """Of one case: what the kind of the study has, `None` where the case did not get so far. SI units; `peak_flux_fraction` of the
-    guard's limit; of a parameter what is true, the value found and its standard deviation."""
+    guard's limit; of a parameter what is true, the value found and its standard deviation. `remarks`: of a recording, what its verb remarks on it (rows left
+    out, units taken), a line each."""
 
     case: int
     outcome: str
@@ -45,6 +46,7 @@ class Row(TypedDict):
     magnetizing_inductance_h_value: NotRequired[float | None]
     magnetizing_inductance_h_std: NotRequired[float | None]
     file: NotRequired[str]
+    remarks: NotRequired[str]
     causes: NotRequired[str]
     held_out: NotRequired[float | None]
     mean_speed_rad_per_s: NotRequired[Measured]

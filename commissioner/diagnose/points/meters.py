@@ -16,7 +16,7 @@ from commissioner.diagnose.intake.points import Array
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import connection_of
-from commissioner.records import DIRECT_TEST, WATT_METERS
+from commissioner.records import DIRECT_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, WATT_METERS
 
 VOLTS_APART, AMPERES_APART = 0.05, 0.15
 """By which one of three meters may differ from their mean. NEMA MG 1-14.36: no motor is to run on volts that differ by more than
@@ -63,7 +63,22 @@ def line_values(columns: Mapping[str, Array], said: Mapping[str, float | str]) -
         if found and found[0].columns != (line,):
             out[line] = found[0].values
             remarks.append(f"{line} {found[0].said}")
-    return LineValues(out, tuple(remarks))
+    return _of_three_phases(LineValues(out, tuple(remarks)))
+
+
+def _of_three_phases(seen: LineValues) -> LineValues:
+    """Single-phase tests of a locked rotor as the three-phase test of the same current: between two terminals lie two phases, so that
+    Z = V / (2 I) and R = P / (2 I^2) of each."""
+    single = np.asarray(seen.columns.get("test", np.nan)) == SINGLE_PHASE_TEST
+    if not np.any(single):
+        return seen
+    out = dict(seen.columns)
+    for name, factor in (("voltage_line_v", ROOT_3 / 2.0), ("power_w", 1.5)):
+        if name in out:
+            out[name] = np.where(single, factor, 1.0) * out[name]
+    out["test"] = np.where(single, LOCKED_TEST, out["test"])
+    said = "Single-phase current was taken as flowing between two terminals, the third open: a phase has Z = V / (2 I), R = P / (2 I^2)."
+    return LineValues(out, (*seen.remarks, said))
 
 
 def _volts(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> Iterator[_Form | DataRefused]:

@@ -221,26 +221,35 @@ class Comparison:
 
 
 REPEATABILITY = (0.004, 0.006, 0.006, 0.008)
-"""What a repeated test of an unchanged motor scatters beyond its stated errors (sensor drift, rotor position)."""
+"""What each repeated test of an unchanged motor scatters beyond its stated errors (sensor drift, rotor position), one standard
+deviation as in ISO 5725: a difference of two tests has it twice."""
 TEMPERATURE_K = 25.0
-"""One standard deviation of the unknown difference in winding temperature between two tests."""
+"""One standard deviation of the unknown difference in winding temperature between two tests; each has its half of the variance."""
+ROTOR_BESIDE = 0.3
+"""How far a rotor's unknown temperature differs from its winding's, as a share of that."""
 RESISTANCE_PER_K = 0.0039
 
 
+def scatter(test: Combined, temperature_is_known: bool) -> Matrix:
+    """(4,), one standard deviation of the parameters' logarithms: what one test of an unchanged motor scatters in all. A
+    difference of two tests scatters by the root of both squares."""
+    claimed = np.diag(test.covariance) / np.square(test.parameters.as_tuple())
+    heat = 0.0 if temperature_is_known else RESISTANCE_PER_K * TEMPERATURE_K / math.sqrt(2.0)
+    warm = np.array([heat, math.hypot(heat, ROTOR_BESIDE * heat), 0.0, 0.0])
+    return np.asarray(np.sqrt(claimed + np.square(REPEATABILITY) + warm**2))
+
+
 def compare(
-    before: Combined, after: Combined, temperature_is_known: bool = False, limit_sigmas: float = 3.5
+    before: Combined,
+    after: Combined,
+    temperature_is_known: tuple[bool, bool] = (False, False),
+    limit_sigmas: float = 3.5,
 ) -> Comparison:
-    """Whether two results belong to one motor. Resistances may move together with an unknown temperature; a motor of
+    """Whether two results belong to one motor. Resistances may move with an unknown temperature of either; a motor of
     which both inductances, or three parameters, have moved by more than a tenth is another one."""
-    old, new = np.log(before.parameters.as_tuple()), np.log(after.parameters.as_tuple())
-    covariance = sum(
-        c.covariance / np.outer(c.parameters.as_tuple(), c.parameters.as_tuple()) for c in (before, after)
-    ) + np.diag(np.square(REPEATABILITY))
-    if not temperature_is_known:
-        heat = np.array([1.0, 1.0, 0.0, 0.0]) * RESISTANCE_PER_K * TEMPERATURE_K
-        covariance = covariance + np.outer(heat, heat) + np.diag([0.0, (0.3 * heat[1]) ** 2, 0.0, 0.0])
-    difference = new - old
-    sigmas = np.abs(difference) / np.sqrt(np.diag(covariance))
+    difference = np.log(after.parameters.as_tuple()) - np.log(before.parameters.as_tuple())
+    std = [scatter(test, known) for test, known in zip((before, after), temperature_is_known, strict=True)]
+    sigmas = np.abs(difference) / np.hypot(*std)
     changes = tuple(
         Change(PARAMETERS[k], float(math.expm1(difference[k])), float(sigmas[k])) for k in np.argsort(-sigmas)
     )

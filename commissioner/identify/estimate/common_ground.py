@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.identify.estimate.axes import Combined
+from commissioner.identify.estimate.axes import TEMPERATURE_K, Combined
 from commissioner.motor.circuit import InverseGamma
 
 COPPER_ZERO_DEGC = -234.5
@@ -101,7 +101,11 @@ def _with_inductance(combined: Combined, machine: InverseGamma, relative_std: fl
 def _at_one_temperature(results: Sequence[Result]) -> tuple[Sequence[Result], float | None, list[str]]:
     degc = results[0].winding_degc
     if degc is None or any(result.winding_degc is None for result in results):
-        return results, None, ["a winding temperature is not known: resistances may differ by what 25 K make"]
+        return (
+            results,
+            None,
+            [f"a winding temperature is not known: resistances may differ by what {TEMPERATURE_K:g} K make"],
+        )
     moved = [at_temperature(result, degc, results[0].name) for result in results[1:]]
     return [results[0], *(result for result, _ in moved)], degc, [sentence for _, sentence in moved]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.history.explain import Array, Explanation, explain
-from commissioner.identify.estimate.axes import Combined, Comparison, compare
+from commissioner.identify.estimate.axes import Combined, Comparison, compare, scatter
 from commissioner.identify.estimate.common_ground import CommonGround, Result, brought_together
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.operations.history.runs import Archive, find_runs
@@ -132,15 +132,11 @@ def _set_by(runs: Path, held: Mapping[str, float]) -> SetBy | None:
 def beside(first: Result, second: Result) -> Compared:
     """Two results on common ground."""
     old, new, common = brought_together(first, second)
-    comparison = compare(old, new, temperature_is_known=common.temperature_degc is not None)
-    moved = _logs(new) - _logs(old), np.hypot(_relative_std(old), _relative_std(new))
+    comparison = compare(old, new, (first.winding_degc is not None, second.winding_degc is not None))
+    moved = _logs(new) - _logs(old), np.hypot(scatter(old, True), scatter(new, True))
     told = explain(first, second, moved, common, comparison.verdict)
     return Compared(first.name, second.name, comparison, common, told)
 
 
 def _logs(combined: Combined) -> Array:
     return np.asarray(np.log(combined.parameters.as_tuple()))
-
-
-def _relative_std(combined: Combined) -> Array:
-    return np.asarray(np.sqrt(np.diag(combined.covariance)) / np.array(combined.parameters.as_tuple()))

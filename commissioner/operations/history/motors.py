@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.identify.estimate.axes import Comparison, Identity, compare
-from commissioner.identify.estimate.common_ground import brought_together
+from commissioner.identify.estimate.axes import Comparison, Identity
+from commissioner.operations.history.compare import beside
 from commissioner.operations.history.runs import Archive, Wanted, find_runs
 from commissioner.run.archive.catalogue import find_run, read_run
 from commissioner.run.archive.folder import RunFolder
@@ -149,9 +149,7 @@ def _likeness(summary: RunSummary, motor: str, rows: Sequence[Row]) -> Likeness 
     for row in rows[:JUDGED_AGAINST]:
         other = read_run(Path(row.folder))
         if has_result(other) and dict(other.motor) == dict(summary.motor):
-            old, new, common = brought_together(result_of(other), result_of(summary))
-            comparison = compare(old, new, temperature_is_known=common.temperature_degc is not None)
-            return Likeness(motor, row.motor_serial, other.run, comparison)
+            return Likeness(motor, row.motor_serial, other.run, beside(result_of(other), result_of(summary)).comparison)
     return None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -220,7 +220,7 @@ def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
         sample_period_s=first.sample_period_s,
         metadata=first.metadata,
         source=", ".join(r.source for r in recordings),
-        notes=tuple(dict.fromkeys(note for r in recordings for note in r.notes)),
+        notes=tuple(replace(n, what=f"{Path(r.source).name}: {n.what}") for r in recordings for n in r.notes),
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from commissioner.recordings.words import folded, translated
-from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, ReadingNote, Signal
+from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, ReadingNote, Signal
 
 TITLES = frozenset({"test", "testtype", "typetest", "kind", "pruefung", "versuchsart", "typeoftest"})
 WORDS = {
@@ -16,6 +16,9 @@ WORDS = {
     IDLE_TEST: r"noload|idle|idling|leerlaufversuch|unloaded",
     LOCKED_TEST: r"(?:locked|blocked)(?:rotor)?|(?:en|in|a)?shortcircuit|kurzschlu(?:ss|ß)(?:versuch)?|festgebremst|arotorlocked|a?lockedrotor|standstill",
 }  # fmt: skip
+SINGLE_PHASE = re.compile(
+    r"single[\W_]*phase|\b1[\W_]*(?:ph(?:ase|asig)?\b|~)|einphasig\w*|mono(?:ph|f)as\w*", re.IGNORECASE
+)
 
 
 def is_title(name: str) -> bool:
@@ -25,9 +28,16 @@ def is_title(name: str) -> bool:
 
 def codes(cells: Sequence[str]) -> Signal | None:
     """`(n,)` of `records.DIRECT_TEST` ...; not a number where a cell says nothing known, None where no cell does."""
-    said = [re.sub("^test|test$", "", _letters(cell)) for cell in cells]
-    out = np.array([next((c for c, w in WORDS.items() if re.fullmatch(w, one)), np.nan) for one in said])
+    out = np.array([_code(cell) for cell in cells])
     return out if np.isfinite(out).any() else None
+
+
+def _code(cell: str) -> float:
+    """Single-phase is told of a locked rotor only: direct current flows between two terminals anyway."""
+    words, is_single = SINGLE_PHASE.subn(" ", folded(cell))
+    one = re.sub("^test|test$", "", _letters(words))
+    code = next((c for c, w in WORDS.items() if re.fullmatch(w, one)), np.nan)
+    return SINGLE_PHASE_TEST if is_single and code != DIRECT_TEST else code
 
 
 def unknown(cells: Sequence[str], said: Signal) -> tuple[ReadingNote, ...]:

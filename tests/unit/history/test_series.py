@@ -7,9 +7,10 @@ import pytest
 
 from commissioner.history.motor import Measured, motor_trends
 from commissioner.history.series import judge
-from commissioner.identify.estimate.axes import Combined
+from commissioner.identify.estimate.axes import Combined, Identity
 from commissioner.identify.estimate.common_ground import Result
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
+from commissioner.operations.history.compare import beside
 
 STATED = 0.03
 """A rate that 2 000 series can measure; trends promise 0.001 by the same formulas."""
@@ -134,3 +135,41 @@ def test_a_sentence_has_the_interval_that_every_page_has():
 def combined_of():
     values = np.array([3.7, 2.2, 0.0215, 0.31])
     return Combined(InverseGamma(*values), np.diag((0.001 * values) ** 2), (0.0,) * 4, (), ())
+
+
+def scaled(degc, factors):
+    """A result that claims 0.2 %."""
+    values = np.array([3.7, 2.2, 0.0215, 0.31]) * factors
+    combined = replace(combined_of(), parameters=InverseGamma(*values), covariance=np.diag((0.002 * values) ** 2))
+    return Result("r", combined, 0.7, (), degc)
+
+
+@pytest.mark.parametrize(("degc", "share"), [((20.0, 20.0), 0.0), ((None, 20.0), 0.5), ((None, None), 1.0)])
+def test_a_difference_is_as_sure_between_two_runs_as_between_two_points_of_a_trend(degc, share):
+    """Repeatability is each run's: a difference has it twice. 25 K of unknown temperature are a difference's: each run has half the
+    variance. By hand from the table of repeatability, claimed errors of 0.2 %."""
+    pair = [scaled(known, [1.05, 1.05, 1.05, 1.05] if k else [1.0] * 4) for k, known in enumerate(degc)]
+    repeat, heat = np.array([0.004, 0.006, 0.006, 0.008]), 0.0039 * 25.0 * np.array([1.0, np.sqrt(1.09), 0.0, 0.0])
+    std = np.sqrt(2 * 0.002**2 + 2 * repeat**2 + share * heat**2)
+    sigmas = {change.parameter: change.sigmas for change in beside(*pair).comparison.changes}
+    assert [sigmas[name] for name in PARAMETERS] == pytest.approx(np.log(1.05) / std)
+    points = [
+        trend.points for trend in motor_trends([Measured(str(k), 86400.0 * k, r) for k, r in enumerate(pair)]).trends
+    ]
+    assert [np.hypot(*(point.std / point.value for point in two)) for two in points] == pytest.approx(std)
+
+
+def test_a_change_just_beyond_the_limit_has_its_causes():
+    """3.55 standard errors in one of four: their common chance, 0.013, is no reason to be silent."""
+    limit = np.hypot(0.006, 0.002) * np.sqrt(2.0)
+    done = beside(scaled(20.0, [1.0] * 4), scaled(20.0, [1.0, 1.0, float(np.exp(3.55 * limit)), 1.0]))
+    assert done.comparison.verdict is Identity.CHANGED
+    assert done.explained_by[0].cause == "leakage"
+
+
+def test_an_explanations_error_is_relative_as_its_size_is():
+    """A tripled R_s by a cable is three times as uncertain, relative to what it was, as an R_s that has not moved."""
+    done = beside(scaled(20.0, [1.0] * 4), scaled(20.0, [3.0, 1.0, 1.0, 1.0]))
+    (cable,) = [one for one in done.explained_by if one.cause == "cable"]
+    assert cable.size == pytest.approx(2.0)
+    assert cable.std == pytest.approx(3.0 * np.sqrt(2.0) * np.hypot(0.004, 0.002))

@@ -201,3 +201,25 @@ def test_a_test_of_an_unknown_name_is_said_and_told_from_its_values(tmp_path: Pa
     assert isinstance(done, IdentifiedSheets)
     assert any("no known test: Zerlegeversuch" in one.what for one in read_table(path).notes)
     assert done.document["parameters"]["magnetizing_inductance_h"]["value"] == pytest.approx(35.11e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "called", ["locked rotor, single-phase", "Kurzschluss einphasig", "blocked rotor (1~)", "à rotor bloqué monophasé"]
+)
+def test_a_single_phase_locked_rotor_is_the_three_phase_one_of_its_current(tmp_path: Path, called: str) -> None:
+    """Between two terminals, the third open, lie two phases: V = 2 I Z, P = 2 I^2 R. It was taken for three phases: R_R -69 %."""
+    single = f'"{called}",15,{25 * 2 / np.sqrt(3):.9g},27.9,{920 * 2 / 3:.9g}'
+    path = tmp_path / "sheet.csv"
+    path.write_text(SHEETS["contract"].replace("locked_rotor,15,25,27.9,920", single), encoding="utf-8")
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    found = [q["value"] for q in done.document["parameters"].values()]
+    assert found[:4] == pytest.approx([0.2429, 0.1514, 3.484e-3, 35.11e-3], rel=1e-3)
+    assert any("the third open" in remark for remark in done.document["remarks"])
+
+
+def test_no_load_with_single_phase_current_is_no_test(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(SHEETS["contract"].replace("no_load", "no_load single phase"), encoding="utf-8")
+    with pytest.raises(DataRefused, match="is called locked rotor and is no load by its inductance"):
+        identify_any(IdentifyRequest((path,)))
