@@ -349,13 +349,7 @@ def _next(subject: Subject) -> Iterator[Text]:
     yield "Measure again when motor, cable or drive was changed."
     longer = subject.findings.longer_test
     if longer is not None:
-        yield spoken(
-            sentence(
-                longer.sentence.replace("standard errors", "intervals")
-                if "nothing" in longer.sentence
-                else longer.sentence
-            )
-        )
+        yield spoken(sentence(longer.sentence))
 
 
 def least_no_load_current_a(subject: Subject) -> tuple[float, float] | None:

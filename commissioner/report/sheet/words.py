@@ -20,7 +20,7 @@ UNITS: Mapping[str, tuple[str, int]] = {
     "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
 }  # fmt: skip
 """Of what a check sees, by the check's plain name; and its decimals."""
-_SIGNS = (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ"))
+_SIGNS = (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ"), ("->", "→"))
 _MOST_DIGITS = 9
 
 
