@@ -35,7 +35,7 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
         )
     white = [a["whiteness"]["is_white"] for a in document["axes"]]
     out.print(
-        f"{len(white)} axis test(s), {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
+        f"Axis tests: {len(white)}, {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
         + "{lost_samples} samples lost in {count} gaps.".format(**document["gaps"])
     )
     for finding in document["findings"]:

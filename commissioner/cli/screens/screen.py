@@ -136,7 +136,7 @@ def kept(is_stored: bool) -> str:
 
 def wear(count: int, fraction: float) -> str:
     """How much of the drive's memory is used up."""
-    return f"{count} writes of the drive's memory so far, {fraction:.3%} of its life"
+    return f"writes of the drive's memory so far: {count}, {fraction:.3%} of its life"
 
 
 _MARKS = {

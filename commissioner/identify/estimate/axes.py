@@ -101,7 +101,7 @@ def _remarks(axes: Sequence[AxisEstimate]) -> tuple[str, ...]:
     orientations = _orientations(axes)
     remarks = []
     if not _pattern_is_visible(axes):
-        remarks.append(f"{len(orientations)} orientation(s): sensor gain and anisotropy need at least three")
+        remarks.append(f"orientations: {len(orientations)}; sensor gain and anisotropy need at least three")
     if len(orientations) == len(axes) and len(axes) > 1:
         remarks.append("no orientation was repeated: heating cannot be told from differences between axes")
     return tuple(remarks)

@@ -2,6 +2,9 @@
 
 import pytest
 
+from commissioner.identify.estimate.axes import Cause
+from commissioner.identify.excite.duration import LongerTest
+from commissioner.identify.intake.alignment import TimeShift
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.page.texts import Texts
 from commissioner.service.page.words import Words
@@ -27,3 +30,15 @@ OFFSETS = {f"offset_{phase}_a": size(a, 4.95e-5, "A") for phase, a in zip("uvw",
 )  # fmt: skip
 def test_the_first_size_is_shown_and_what_is_measured_alike_to_the_digits_of_its_error(sizes, shown):
     assert Words(Texts("en")).size(sizes).replace(NBSP, " ") == shown
+
+
+def test_what_the_core_remarks_of_every_run_has_its_german():
+    german = Texts("de")
+    remarks = (
+        LongerTest(8.0, (0.002,) * 4, (0.001,) * 4).sentence, LongerTest(8.0, (0.002,) * 4, (0.002,) * 4).sentence,
+        TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
+        "orientations: 2; sensor gain and anisotropy need at least three",
+        "the tests reached 0.685 Wb; from there to 0.731 Wb, the level that L_M is told for, their own magnetizing curve leads; a "
+        "quarter of the way is in L_M's standard error",
+    )  # fmt: skip
+    assert [remark for remark in remarks if not german.knows(remark)] == []
