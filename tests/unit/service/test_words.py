@@ -1,12 +1,16 @@
 """Sizes of causes as the page writes them."""
 
+from importlib.resources import files
+from types import SimpleNamespace
+
 import pytest
 
 from commissioner.identify.estimate.axes import Cause
 from commissioner.identify.excite.duration import LongerTest
 from commissioner.identify.intake.alignment import TimeShift
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.report.sheet.words import NBSP
-from commissioner.service.page.texts import Texts
+from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import Words
 
 
@@ -37,8 +41,17 @@ def test_what_the_core_remarks_of_every_run_has_its_german():
     remarks = (
         LongerTest(8.0, (0.002,) * 4, (0.001,) * 4).sentence, LongerTest(8.0, (0.002,) * 4, (0.002,) * 4).sentence,
         TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
+        RESTORED_SINCE, ACCEPTED, "as before, read back", "no load current", "not identified",
+        "Schneider Altivar ATV320, serial number not known",
         "orientations: 2; sensor gain and anisotropy need at least three",
         "the tests reached 0.685 Wb; from there to 0.731 Wb, the level that L_M is told for, their own magnetizing curve leads; a "
         "quarter of the way is in L_M's standard error",
     )  # fmt: skip
     assert [remark for remark in remarks if not german.knows(remark)] == []
+
+
+def test_the_live_line_speaks_the_language_of_its_page():
+    script = files("commissioner.service.page").joinpath("static", "js", "page.js").read_text("utf-8")
+    assert "?lang=${root.lang}" in script
+    line = SimpleNamespace(cookies={}, query_params={"lang": "de"}, headers={"accept-language": "en-US"})
+    assert texts_of(line).language == "de"
