@@ -10,6 +10,7 @@ from commissioner.identify.excite.duration import LongerTest
 from commissioner.identify.intake.alignment import TimeShift
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.report.sheet.words import NBSP
+from commissioner.service.page.frame import environment, words_of
 from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import Words
 
@@ -55,3 +56,19 @@ def test_the_live_line_speaks_the_language_of_its_page():
     assert "?lang=${root.lang}" in script
     line = SimpleNamespace(cookies={}, query_params={"lang": "de"}, headers={"accept-language": "en-US"})
     assert texts_of(line).language == "de"
+
+
+@pytest.mark.parametrize(("plate_low", "is_compared"), [(None, False), (0.5, True)])
+def test_a_tuning_agrees_with_the_plate_only_where_it_was_compared_with_it(plate_low, is_compared):
+    row = {
+        "name": "stator_resistance", "unit": "raw", "before": 1.0, "median": 2.0, "spread_percent": 0.1, "change_percent": None,
+        "ours": plate_low, "plate_low": plate_low, "plate_high": plate_low,
+    }  # fmt: skip
+    words = {**words_of("en"), "losses": ()}
+    template = environment().get_template("work/tuned.html")
+    result = {"outcome": "commissioned", "tune": {"rows": [row], "repeats": [{}]}, "reason": "x"}
+    parts = environment().get_template("frame/parts.html").make_module(words)
+    context = template.new_context({**words, "p": parts, "result": result, "tune": result["tune"], "good": True})
+    said = "".join(template.blocks["main"](context))
+    assert "tunings agree with" in said
+    assert ("agree with the plate" in said) is is_compared
