@@ -202,7 +202,9 @@ def _trend(verdict: Verdict, history: History, indicators: Sequence[Indicator]) 
             "Healthy recordings, those judged since, and this one (last point), with the 95 % interval of a recording. "
             "Shaded: the range outside which an indicator alarms.",
         ),
-        Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
+        Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, note)
+        if rows
+        else note,
     )
 
 

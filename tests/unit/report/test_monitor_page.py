@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from commissioner.cli.screens.screen import quantity, share
+from commissioner.monitor.result import cannot_be_fixed
 from commissioner.monitor.trend.indicators import in_words
 from commissioner.monitor.trend.trend import State, Verdict, Watched
 from commissioner.records import RPM
@@ -53,3 +54,12 @@ def test_no_key_of_an_indicator_is_shown():
 )
 def test_an_indicator_has_its_unit(name, words):
     assert in_words(name) == words
+
+
+def test_the_least_known_has_the_interval_of_the_table_above_it():
+    fitted = SimpleNamespace(
+        open_direction=np.array([1.0, 0.0, 0.0, 0.0]), log_covariance=0.01 * np.eye(4), open_share=0.1
+    )
+    found = cannot_be_fixed(fitted)
+    assert found["relative_std"] == pytest.approx(0.1)
+    assert "to ± 19.6%" in found["sentence"]
