@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from commissioner.motor.quantities import FIVE, Quantity
-from commissioner.report.diagnosis.numbers import quantity_name
 from commissioner.report.page import Page, Section, Table, Tone, picture
 from commissioner.report.running import figures
 from commissioner.report.running.words import (
@@ -21,6 +20,7 @@ from commissioner.report.running.words import (
     tone,
 )
 from commissioner.report.sheet.numbers import half_width, with_interval
+from commissioner.report.sheet.words import quantity_name
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 
