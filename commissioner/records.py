@@ -9,6 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+def plain_name(item: str) -> str:
+    """`stator_resistance` as people say it."""
+    return item.replace("_", " ")
+
+
 def drive_words(drive_type: str, serial_number: int | None) -> str:
     """`SIM-INV-7A #4711`; a number that is not known is said to be so, never shown as 0."""
     return f"{drive_type}, serial number unknown" if serial_number is None else f"{drive_type} #{serial_number}"

@@ -33,7 +33,7 @@ from commissioner.monitor.machine.waveform import Solved
 from commissioner.monitor.partial import Partial, of_terminals
 from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
 from commissioner.monitor.trend.trend import FALSE_ALARM, Entry, Verdict
-from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS
+from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS, QUANTILE
 from commissioner.motor.running import TCircuit
 
 QUANTITIES = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
@@ -190,7 +190,7 @@ def cannot_be_fixed(fitted: Fitted) -> OpenDirection:
             f"This recording hardly fixes {symbols}: {fitted.open_share:.0%} of what was unsure before is left. "
             "Take them from a commissioning run."
             if fitted.open_share > OPEN
-            else f"Least known: {symbols}, to {std:.1%}; all four are usable."
+            else f"Least known: {symbols}, to ± {QUANTILE * std:.1%}; all four are usable."
         ),
     }
 

@@ -16,6 +16,7 @@ import numpy as np
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.motor.quantities import in_shown_unit
 from commissioner.procedure.verdict import Objection
+from commissioner.records import plain_name
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile, Item
 
@@ -72,7 +73,9 @@ class TuneVerdict:
         if self.objections:
             return self.objections[0].what
         return "the drive's own tunings agree with each other" + (
-            f"; not compared with the plate: {', '.join(self.not_judged)}" if self.not_judged else " and with the plate"
+            f"; not compared with the plate: {', '.join(map(plain_name, self.not_judged))}"
+            if self.not_judged
+            else " and with the plate"
         )
 
 
@@ -148,8 +151,8 @@ def _line(values: Sequence[float]) -> float:
     """By how much the fitted line rises from the first repeat to the last."""
     if len(values) < 2:
         return 0.0
-    steps = np.arange(len(values))
-    return float(np.polyfit(steps, np.array(values), 1)[0]) * (len(values) - 1)
+    steps = np.arange(len(values)) - 0.5 * (len(values) - 1)
+    return float(steps @ (np.array(values) - values[0]) / (steps @ steps)) * (len(values) - 1)
 
 
 def _percent(part: float, whole: float) -> float:
@@ -165,14 +168,14 @@ def _distance(repeat: Mapping[str, float], medians: Mapping[str, float]) -> floa
 def _objections(row: TunedRow) -> Iterator[Objection]:
     if row.median <= 0.0:
         yield Objection(
-            f"{row.name} is not a motor's", row.median, "above 0",
+            f"{plain_name(row.name)} is not a motor's", row.median, "above 0",
             "the drive found nothing: check the motor's connection, and the item's address and width in the drive file",
         )  # fmt: skip
         return
     low, high = row.plate_low, row.plate_high
     if row.field and row.ours is not None and low is not None and high is not None and not low <= row.ours <= high:
         yield Objection(
-            f"{row.name} is not physical for this nameplate", in_shown_unit(row.field, row.ours), in_shown_unit(row.field, low, high),
+            f"{plain_name(row.name)} is not physical for this nameplate", in_shown_unit(row.field, row.ours), in_shown_unit(row.field, low, high),
             "check the plate in the drive, the motor's connection, and the drive file's scale and convention",
         )  # fmt: skip
     if len(row.values) < FEWEST:
@@ -180,7 +183,7 @@ def _objections(row: TunedRow) -> Iterator[Objection]:
     if row.spread_percent > SPREAD_PERCENT:
         far = max(row.values, key=lambda value: abs(value - row.median))
         yield Objection(
-            f"{row.name} differs between the repeats, most in number {row.values.index(far) + 1}",
+            f"{plain_name(row.name)} differs between the repeats, most in number {row.values.index(far) + 1}",
             f"{row.spread_percent:.2g} %", f"{SPREAD_PERCENT:g} %",
             "keep the shaft at rest and tune again; a repeat that is wrong once makes all of them doubtful",
         )  # fmt: skip
@@ -190,6 +193,6 @@ def _objections(row: TunedRow) -> Iterator[Objection]:
         and abs(row.trend_percent) > TREND_PERCENT
     ):
         yield Objection(
-            f"{row.name} runs away over the repeats: each of them heats the winding",
+            f"{plain_name(row.name)} runs away over the repeats: each of them heats the winding",
             f"{row.trend_percent:+.2g} %", f"{TREND_PERCENT:g} %", "let the motor cool down and give a longer --pause",
         )  # fmt: skip

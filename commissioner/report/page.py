@@ -92,6 +92,11 @@ def figure_of(rows: int, columns: int, height: float, **options: Any) -> tuple[F
         return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
+def legend_above(axes: Any) -> None:
+    """The legend in one line over the upper right corner, where it hides nothing that is drawn."""
+    axes.legend(ncols=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, fontsize=7, frameon=False)
+
+
 def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
     """The figure as inline SVG, or as an inline PNG where it holds more points than a browser likes."""
     import base64
@@ -145,7 +150,7 @@ tr.good td:first-child { box-shadow:inset 3px 0 var(--good); padding-left:10px }
 tr.bad td:first-child { box-shadow:inset 3px 0 var(--bad); padding-left:10px } figure { margin:8px 0 16px } figure svg,figure img { width:100%; height:auto }
 figcaption { color:var(--muted); font-size:13px } p { margin:0 0 10px; max-width:80ch } footer { color:var(--muted); font-size:12.5px }
 .wide { overflow-x:auto } @media print { body { background:#fff } header,section { border-color:#bbb }
-  header,figure,tr { break-inside:avoid } h2,thead { break-after:avoid } .wide { overflow:visible } }
+  header,figure,tr,section:not(:has(figure,table)) { break-inside:avoid } h2,thead { break-after:avoid } .wide { overflow:visible } }
 </style></head><body><main>
 <header><h1>{{ page.title }}</h1><p class="headline">{{ page.headline }}</p>
 <dl>{% for name, value in page.facts %}<div><dt>{{ name }}</dt><dd>{{ value }}</dd></div>{% endfor %}</dl></header>

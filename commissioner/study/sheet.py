@@ -147,7 +147,7 @@ def _flux(rows: Sequence[Row]) -> Markup:
     known = [(float(row["case"]), fraction) for row in rows if (fraction := row.get("peak_flux_fraction"))]
     cases, fractions = [case for case, _ in known], [fraction for _, fraction in known]
     panel = Panel(660, 130, _span(cases), (0.0, 1.1 * max(1.0, *fractions)), "highest true flux of each case", left=30)
-    _dotted(panel.grid(4).axis("", 6).level(1.0), cases, fractions)
+    _dotted(panel.grid(4).axis("", min(6, max(1, len(cases) - 1))).level(1.0), cases, fractions)
     return marks.figure(
         "Highest true flux of each case, of the guard’s limit",
         panel.drawn(),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.motor.quantities import FIVE
+from commissioner.report.sheet.numbers import half_width, interval
 
 
 def _title(sources: Sequence[str]) -> str:
@@ -22,9 +23,8 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     rows = []
     for q in FIVE:
         quantity = document["parameters"][q.field]
-        value, std = q.factor * quantity["value"], q.factor * quantity["std"]
-        rows.append((q.name, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", q.unit))
-    out.print(table(_title(sources), ("per phase, star equivalent", "value", "std error", "unit"), rows, right=(1, 2)))
+        rows.append((q.name, *_measured(quantity, q.factor), q.unit))
+    out.print(table(_title(sources), ("per phase, star equivalent", "value", "± 95 %", "unit"), rows, right=(1, 2)))
     flux = document["holds_for_stator_flux_wb"]
     rated = document["rated_flux_wb"]["stator_peak"]
     out.print(f"L_M holds for {flux:.3g} Wb peak stator flux ({flux / rated:.0%} of rated {rated:.3g} Wb).")
@@ -35,11 +35,13 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
         )
     white = [a["whiteness"]["is_white"] for a in document["axes"]]
     out.print(
-        f"{len(white)} axis test(s), {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
+        f"Axis tests: {len(white)}, {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
         + "{lost_samples} samples lost in {count} gaps.".format(**document["gaps"])
     )
     for finding in document["findings"]:
-        out.print(f"- {finding['sentence']}: {finding['relative_size']:+.2%} (std {finding['relative_std']:.2%})")
+        out.print(
+            f"- {finding['sentence']}: {finding['relative_size']:+.2%} ± {half_width(finding['relative_std']):.2%}"
+        )
     for remark in document["remarks"]:
         out.print(f"- {remark}", markup=False)
 
@@ -51,16 +53,14 @@ def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     rows = []
     for q in FIVE:
         quantity = document["parameters"][q.field]
-        value, std = q.factor * quantity["value"], q.factor * quantity["std"]
-        bound = q.factor * document["bound_std"][q.field]
-        rows.append((q.name, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", f"{bound:.2g}", q.unit))
-    if document["inertia_kg_m2"]:
-        value, std = document["inertia_kg_m2"]["value"], document["inertia_kg_m2"]["std"]
-        rows.append(("inertia J", f"{value:.4g}", f"{std:.2g} ({std / value:.2%})", "", "kg m2"))
+        bound = half_width(document["bound_std"][q.field], q.factor)
+        rows.append((q.name, *_measured(quantity, q.factor), f"{bound:.2g}", q.unit))
+    if inertia := document["inertia_kg_m2"]:
+        rows.append(("inertia J", *_measured(inertia, 1.0), "", "kg m²"))
     out.print(
         table(
             _title(sources),
-            ("per phase, star equivalent", "value", "std error", "least by noise", "unit"),
+            ("per phase, star equivalent", "value", "± 95 %", "least by noise", "unit"),
             rows,
         )
     )
@@ -82,13 +82,12 @@ def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     rows = []
     for q in FIVE:
         quantity = document["parameters"][q.field]
-        std = "not known" if quantity["std"] is None else f"{q.factor * quantity['std']:.2g}"
-        rows.append((q.name, f"{q.factor * quantity['value']:.5g}", std, q.unit))
+        rows.append((q.name, *_measured(quantity, q.factor), q.unit))
     ends = document["at_terminals"]
     rows.append(("between two terminals, R", f"{ends['resistance_uv_ohm']:.5g}", "", "Ω"))
     rows.append(("between two terminals, L idle", f"{1e3 * ends['inductance_uv_h']:.5g}", "", "mH"))
     title = _title(sources)
-    out.print(table(title, ("per phase, star equivalent", "value", "std error", "unit"), rows))
+    out.print(table(title, ("per phase, star equivalent", "value", "± 95 %", "unit"), rows))
     t, book = document["t_circuit"], document["textbook"]
     w = 2.0 * 3.141592653589793 * book["frequency_hz"]
     exact = (
@@ -113,7 +112,7 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
 
     found = document["parameters"]
     rows = [(q.name, *_with_errors(found[q.field], q.factor), q.unit) for q in FIVE if q.field in found]
-    heads = ("per phase, star equivalent", "value", "std error", "of the type", "unit")
+    heads = ("per phase, star equivalent", "value", "± 95 %", "of the type", "unit")
     out.print(table(_title(sources), heads, rows))
     circuits = (("one cage at rated slip", document["t_circuit"]), ("two cages", document["double_cage"]))
     lines = [
@@ -122,11 +121,11 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
         for k, (name, q) in enumerate(of.items())
     ]
     if lines:
-        out.print(table("", ("T circuit, ohm at rated frequency", "", "value", "std error", "of the type"), lines))
+        out.print(table("", ("T circuit, ohm at rated frequency", "", "value", "± 95 %", "of the type"), lines))
     loss = [
         (name.removesuffix("_w").replace("_", " "), *_with_errors(q, 1.0)) for name, q in document["losses"].items()
     ]
-    out.print(table("", ("losses at rated load, W", "value", "std error", "of the type"), loss))
+    out.print(table("", ("losses at rated load, W", "value", "± 95 %", "of the type"), loss))
     met = [(v["name"], f"{v['given']:.5g}", f"{v['reproduced']:.5g}", v["unit"], "" if v["is_fitted"] else "not used")
            for v in document["values"]]  # fmt: skip
     out.print(table("", ("the sheet's values", "given", "circuit", "unit", ""), met))
@@ -137,5 +136,17 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
 
 
 def _with_errors(quantity: Mapping[str, Any], factor: float) -> tuple[str, str, str]:
-    value = quantity["value"]
-    return f"{factor * value:.4g}", f"{quantity['std'] / value:.1%}", f"{quantity['std_of_type'] / value:.1%}"
+    from commissioner.cli.screens.screen import share
+
+    return f"{factor * quantity['value']:.4g}", share(quantity), share(quantity, "std_of_type")
+
+
+def _measured(quantity: Mapping[str, Any], factor: float) -> tuple[str, str]:
+    """The value to the places of its 95 % interval, and half of that, also in per cent."""
+    from commissioner.cli.screens.screen import share
+
+    value, half = factor * quantity["value"], half_width(quantity["std"], factor)
+    if not half:
+        return f"{value:.5g}", "not known"
+    shown, spread = interval(value, half)
+    return shown, f"{spread} ({share(quantity)})"

@@ -10,8 +10,10 @@ from rich.console import Console
 from commissioner.cli.screens.screen import SENTENCE, err, out, quantity, table, text
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
+from commissioner.monitor.trend.indicators import in_words
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.records import RPM
+from commissioner.report.sheet.numbers import half_width
 
 SHOWN = (
     ("R_s", "stator_resistance_ohm", 1, "ohm"),
@@ -57,7 +59,9 @@ def show_partial(document: Mapping[str, Any]) -> None:
     for finding in document["audit"]["findings"]:
         out.print(f"[dim]{finding['kind']}[/] {text(finding['what'])}")
     if document["trend"] is not None:
-        out.print(f"{document['trend']['sentence']}: {', '.join(document['trend']['alarms']) or 'no alarm'}")
+        out.print(
+            f"{document['trend']['sentence']}: {', '.join(in_words(name)[0] for name in document['trend']['alarms']) or 'no alarm'}"
+        )
 
 
 def _states(document: Mapping[str, Any], where: Console) -> None:
@@ -70,7 +74,7 @@ def _states(document: Mapping[str, Any], where: Console) -> None:
         own = s.get("withheld", "")
         if "mean_torque_nm" in s:
             speed, torque = s["mean_speed_rad_per_s"], s["mean_torque_nm"]
-            own = f"{speed['value'] * RPM:.6g} 1/min, {torque['value']:.4g} N m (std {torque['std']:.2g})"
+            own = f"{speed['value'] * RPM:.6g} 1/min, {torque['value']:.4g} N m ± {half_width(torque['std']):.2g}"
         if s["used"] and where is out:
             own = "the answer below"
         rows.append((s["state"], f"{s['start_s']:.3g} ... {s['end_s']:.3g} s", f"{s['current_a']:.3g} A", own))
@@ -83,7 +87,7 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
     wiring = miswired(seen.findings)
     for finding in wiring:
         out.print(f"[bold yellow]check the probes:[/] {text(finding.what, SENTENCE)} (put right here)")
-    out.print(table("", ("", ""), _shaft(seen, document["waveforms"])))
+    out.print(table("", ("", "± is 95 %"), _shaft(seen, document["waveforms"])))
     _load_periods(seen)
     _motor(seen, document["parameters"])
     out.print(document["cannot_be_fixed"]["sentence"])
@@ -94,7 +98,10 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
             out.print(f"[yellow]{finding.kind}[/] {text(finding.what, SENTENCE)}")
     if verdict is not None:
         colour = "red" if verdict.names else "green"
-        out.print(f"[{colour}]{verdict.state.value}[/]" + (": " + ", ".join(verdict.names) if verdict.names else ""))
+        out.print(
+            f"[{colour}]{verdict.state.value}[/]"
+            + (": " + ", ".join(in_words(name)[0] for name in verdict.names) if verdict.names else "")
+        )
     for name, path in document.get("files", {}).items():
         out.print(f"[dim]{name}[/] {text(path)}")
 
@@ -107,13 +114,13 @@ def _shaft(seen: Observation, waveforms: Mapping[str, Any]) -> list[tuple[str, s
         ("mean torque", quantity(seen.mean_torque_nm, seen.mean_torque_std, "N m")),
         (
             "speed within the period",
-            f"± {0.5 * float(speed.max() - speed.min()) * RPM:.3g} 1/min "
-            f"(std {waveforms['speed_rms_std_rad_per_s'] * RPM:.2g})",
+            f"{float(speed.max() - speed.min()) * RPM:.3g} 1/min peak to peak, "
+            f"each point ± {half_width(waveforms['speed_rms_std_rad_per_s'], RPM):.2g}",
         ),
     ]
     said = waveforms["load_torque"]
     if load is not None:
-        said = f"{load.min():.3g} ... {load.max():.3g} N m (std {said['rms_std_nm']:.2g})"
+        said = f"{load.min():.3g} ... {load.max():.3g} N m, each point ± {half_width(said['rms_std_nm']):.2g}"
     rows.append(("load torque", said))
     if seen.inertia_kg_m2 is not None:
         rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))

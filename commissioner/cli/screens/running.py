@@ -27,7 +27,7 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
             (class_name(c), quantity(next(iter(c["parameters"].values()))), f"{100 * c['gain_share']:.1f} %", f"{100 * c['confidence']:.0f} %")
             for c in document["causes"]
         ]  # fmt: skip
-        screen.print(table("", ("cause", "size", "part of the error", "sure of the name"), rows))
+        screen.print(table("", ("cause", "size", "part of what they explain", "sure of the name"), rows))
     if gain["rmse_before_a"] is not None:
         after = f" to {number(1e3 * gain['rmse_after_a'])} mA" if document["causes"] else ""
         screen.print(

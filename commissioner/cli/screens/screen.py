@@ -108,12 +108,23 @@ def shown(value: object, unit: str = "") -> str:
     return in_unit(f"{value:.4g}" if isinstance(value, float) else str(value), value, unit)
 
 
-def quantity(value: float, std: float, unit: str) -> str:
-    """`3.702 +- 0.011 ohm`, rounded to two digits of the standard error."""
-    if not (math.isfinite(std) and std > 0):
+def quantity(value: float, std: float | None, unit: str) -> str:
+    """`3.702 ± 0.011 ohm`: half of the 95 % interval, and both to two digits of it."""
+    from commissioner.report.sheet.numbers import half_width  # with numpy behind it
+
+    half = half_width(std)
+    if not (math.isfinite(half) and half > 0):
         return f"{value:.4g} {unit}"
-    digits = max(0, 1 - math.floor(math.log10(std)))
-    return f"{value:.{digits}f} ± {std:.{digits}f} {unit}"
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    return f"{value:.{digits}f} ± {half:.{digits}f} {unit}"
+
+
+def share(measured: Mapping[str, Any], std: str = "std") -> str:
+    """Half of the 95 % interval in per cent of the value; nothing where no error is known."""
+    from commissioner.report.sheet.numbers import half_width  # with numpy behind it
+
+    half = half_width(measured[std])
+    return f"{100 * half / abs(measured['value']):.2g} %" if half else "not known"
 
 
 def kept(is_stored: bool) -> str:
@@ -125,7 +136,7 @@ def kept(is_stored: bool) -> str:
 
 def wear(count: int, fraction: float) -> str:
     """How much of the drive's memory is used up."""
-    return f"{count} writes of the drive's memory so far, {fraction:.3%} of its life"
+    return f"writes of the drive's memory so far: {count}, {fraction:.3%} of its life"
 
 
 _MARKS = {
@@ -157,7 +168,7 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
         out.print(
             table(
                 "",
-                ("", "value", "std error", "in the drive before", "change", "written"),
+                ("", "value", "± 95 %", "in the drive before", "change", "written"),
                 _rows(document, "restored" if standing_now == RESTORED_SINCE else "yes"),
                 right=(1, 2, 3, 4),
             )
@@ -190,12 +201,12 @@ def _rows(document: Mapping[str, Any], done: str) -> Iterable[Sequence[str]]:
         quantity_ = document["parameters"].get(q.field)
         if quantity_ is None:
             continue
-        value, std = quantity_["value"], quantity_["std"]
+        value = quantity_["value"]
         old = before.get(q.field)
         yield (
             q.name,
             f"{q.factor * value:.4g} {q.unit}",
-            f"{100 * std / abs(value):.2f} %",
+            share(quantity_),
             "" if old is None else f"{q.factor * old:.4g} {q.unit}",
             "" if not old else f"{100 * (value / old - 1):+.1f} %",
             done if q.field in written else "",

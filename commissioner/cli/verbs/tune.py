@@ -13,6 +13,7 @@ from commissioner.cli.screens.ending import EXIT_CODES, show_and_exit
 from commissioner.errors import UsageError
 from commissioner.operations.tune import TunedOnce, TuneRequest, TuningBegan, check_request
 from commissioner.operations.tune import tune as carry_out
+from commissioner.records import plain_name
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
 from commissioner.run.stopping.dead_man import DeadMan
@@ -127,10 +128,10 @@ def _result(document: Mapping[str, Any]) -> None:
         header = ("result", "before", "median", "spread", "trend", "change")
         screen.out.print(screen.table("", header, [_row(row) for row in rows], right=(1, 2, 3, 4, 5)))
         for row in rows:
-            screen.out.print(f"  [dim]•[/] {row['name']}: {screen.text(_said(row))}")
+            screen.out.print(f"  [dim]•[/] {plain_name(row['name'])}: {screen.text(_said(row))}")
             for earlier in row["earlier"][:3]:
                 screen.out.print(
-                    f"  [dim]•[/] {row['name']}: {100 * (row['ours'] / earlier['value'] - 1):+.1f} % to run {earlier['run']}"
+                    f"  [dim]•[/] {plain_name(row['name'])}: {100 * (row['ours'] / earlier['value'] - 1):+.1f} % to run {earlier['run']}"
                 )
     for remark in () if document.get("parameters") else document.get("remarks", ()):
         screen.out.print(f"  [dim]•[/] {screen.text(remark)}")
@@ -139,7 +140,7 @@ def _result(document: Mapping[str, Any]) -> None:
 
 def _row(row: Mapping[str, Any]) -> Sequence[str]:
     return (
-        row["name"],
+        plain_name(row["name"]),
         f"{row['before']:.6g}",
         f"{row['median']:.6g} {row['unit']}",
         f"{row['spread_percent']:.2g} %",

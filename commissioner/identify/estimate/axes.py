@@ -102,8 +102,8 @@ def _remarks(axes: Sequence[AxisEstimate]) -> tuple[str, ...]:
     remarks = []
     if not _pattern_is_visible(axes):
         remarks.append(
-            f"{len(orientations)} orientation(s): sensor gain and anisotropy need at least three; what the phases or their sensors "
-            "differ by is in the values, and not all of it in the standard errors"
+            f"orientations: {len(orientations)}; sensor gain and anisotropy need at least three: what the phases or their sensors "
+            "differ by is in the values, and not all of it in the intervals"
         )
     if len(orientations) == len(axes) and len(axes) > 1:
         remarks.append("no orientation was repeated: heating cannot be told from differences between axes")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.identify.excite.tones import DesignedExcitation
-from commissioner.motor.circuit import SYMBOLS, InverseGamma
+from commissioner.motor.circuit import QUANTILE, SYMBOLS, InverseGamma
 
 TIMES = 2.0
 
@@ -25,16 +25,16 @@ class LongerTest:
     def sentence(self) -> str:
         """For the technician; says so where time would not help."""
         gains = [
-            f"{name} {100 * a:.2g} to {100 * b:.2g} %"
+            f"{name} {100 * QUANTILE * a:.2g} -> {100 * QUANTILE * b:.2g} %"
             for name, a, b in zip(SYMBOLS, self.now, self.then, strict=True)
             if b < 0.95 * a
         ]
         if not gains:
             return (
                 f"a longer test would buy nothing: {self.seconds:.3g} s of tones on each axis instead of "
-                f"{self.seconds / TIMES:.3g} s leave the same standard errors"
+                f"{self.seconds / TIMES:.3g} s leave the same 95 % intervals"
             )
-        return f"{self.seconds:.3g} s of tones on each axis would bring the standard errors from " + ", ".join(gains)
+        return f"{self.seconds:.3g} s of tones on each axis would narrow the 95 % intervals (±): " + ", ".join(gains)
 
 
 def longer_test(

@@ -57,6 +57,14 @@ class Indicator:
     unit: str
 
 
+def in_words(name: str) -> tuple[str, str]:
+    """What it is and its unit: `load_torque_ripple_nm` as ("load torque ripple", "N m")."""
+    for ending, unit in (("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%")):
+        if name.endswith(ending):
+            return name.removesuffix(ending).replace("_", " "), unit
+    return name.replace("_", " "), ""
+
+
 def pulses(observation: Observation) -> Pulses | None:
     """The turn's torque pulses, or None where the torque has no pulse train (no order 2 to 8 stands out)."""
     curves = _turns(observation)

@@ -7,7 +7,8 @@ from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE, TOGETHER, between
 from commissioner.diagnose.causes.cause import AsOne, Words
-from commissioner.report.diagnosis.numbers import PLAIN_NUMBERS, quantity, quantity_name, short, sure
+from commissioner.report.diagnosis.numbers import PLAIN_NUMBERS, quantity, short, sure
+from commissioner.report.sheet.words import quantity_name
 
 Cause = Mapping[str, Any]
 COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}

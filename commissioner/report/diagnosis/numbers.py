@@ -11,7 +11,6 @@ from commissioner.motor.circuit import QUANTILE
 PLUS_MINUS = "± holds the true value in 19 of 20 cases."
 PLAIN_NUMBERS = frozenset({"exponent", "samples", "without_gap_in_time"})
 UNITS = {"us": "µs", "ohm": "Ω", "1/min": "per minute"}
-UNIT_ENDINGS = ("_a_per_min", "_rad_per_s", "_ppm", "_us", "_ms", "_wb", "_nf", "_hz_a", "_v", "_a", "_s")
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -92,13 +91,3 @@ def limit_words(document: Mapping[str, Any], name: str) -> str:
     for key, entry in document.get("detection_limits", {}).get(name, {}).items():
         return short({"std": None, **entry}, key)
     return "-"
-
-
-def quantity_name(key: str) -> str:
-    """`half_current_a` without the unit that the value carries anyway."""
-    for ending in UNIT_ENDINGS:
-        if key.endswith(ending):
-            key = key.removesuffix(ending) + ("_hz" if ending == "_hz_a" else "")
-            break
-    words = key.replace("_", " ").replace(" hz", " Hz")
-    return words.removeprefix("gain ").replace(" over ", " against ") if words.startswith("gain ") else words

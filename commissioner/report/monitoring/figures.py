@@ -9,8 +9,9 @@ import numpy as np
 
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.periods.periods import SIGNIFICANT, VISIBLE
-from commissioner.monitor.trend.indicators import Indicator, Pulses
+from commissioner.monitor.trend.indicators import Indicator, Pulses, in_words
 from commissioner.monitor.trend.trend import History, Verdict
+from commissioner.motor.circuit import QUANTILE
 from commissioner.records import RPM, Signal
 from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, RULE, figure_of
 
@@ -42,7 +43,7 @@ def over_angle(seen: Observation) -> Figure:
     x, y, s = _thin(turns, period.speed_rad_per_s * RPM, period.speed_std * RPM)
     speed, torque = panels[:, 0]
     speed.plot(x, y, color=BLUE)
-    speed.fill_between(x, y - 2 * s, y + 2 * s, color=BLUE, alpha=0.2, linewidth=0)
+    speed.fill_between(x, y - QUANTILE * s, y + QUANTILE * s, color=BLUE, alpha=0.2, linewidth=0)
     speed.set_ylabel("speed / (1/min)")
     for name, value, std, colour in (
         ("electromagnetic", period.torque_nm, period.torque_std, ORANGE),
@@ -51,7 +52,7 @@ def over_angle(seen: Observation) -> Figure:
         if value is not None and std is not None:
             x, y, s = _thin(turns, value, std)
             torque.plot(x, y, color=colour, label=name)
-            torque.fill_between(x, y - 2 * s, y + 2 * s, color=colour, alpha=0.2, linewidth=0)
+            torque.fill_between(x, y - QUANTILE * s, y + QUANTILE * s, color=colour, alpha=0.2, linewidth=0)
     torque.set_ylabel("torque / N m")
     torque.set_xlabel("shaft turns from the first sample of the period")
     torque.legend(frameon=False)
@@ -75,7 +76,7 @@ def polar(seen: Observation) -> Figure:
             turn = 2 * np.pi * round(seen.segment_speed_rad_per_s / (2 * np.pi * seen.combs[0].frequency_hz))
             angle, radius, s = np.append(angle, turn + angle[0]), np.append(radius, radius[0]), np.append(s, s[0])
         panel.plot(angle, radius, color=colour)
-        panel.fill_between(angle, radius - 2 * s, radius + 2 * s, color=colour, alpha=0.2, linewidth=0)
+        panel.fill_between(angle, radius - QUANTILE * s, radius + QUANTILE * s, color=colour, alpha=0.2, linewidth=0)
         if radius.min() < 0 < radius.max():
             panel.plot(np.linspace(0, 2 * np.pi, 200), np.zeros(200), color=MUTED, linewidth=0.8, linestyle="--")
         margin = 0.6 * float(np.ptp(radius)) or 1.0
@@ -162,14 +163,6 @@ def superimposed(pulses: Pulses) -> Figure:
     return figure
 
 
-def _words(name: str) -> str:
-    """`load_torque_ripple_nm` as "load torque ripple / N m"."""
-    for ending, unit in (("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%")):
-        if name.endswith(ending):
-            return f"{name.removesuffix(ending).replace('_', ' ')} / {unit}"
-    return name.replace("_", " ")
-
-
 def trend(history: History, indicators: Sequence[Indicator], verdict: Verdict | None = None) -> Figure:
     """Each indicator over the recordings: healthy ones first, then those judged, with the range in which none alarms."""
     limits = {} if verdict is None else {w.name: w for w in verdict.watched}
@@ -185,7 +178,7 @@ def trend(history: History, indicators: Sequence[Indicator], verdict: Verdict | 
                 panel.errorbar(
                     x,
                     [v for v, _ in values],
-                    yerr=[2 * s for _, s in values],
+                    yerr=[QUANTILE * s for _, s in values],
                     fmt="o",
                     markersize=3,
                     color=colour,
@@ -197,7 +190,7 @@ def trend(history: History, indicators: Sequence[Indicator], verdict: Verdict | 
             panel.axhspan(
                 watched.healthy_mean - reach, watched.healthy_mean + reach, color=GREEN, alpha=0.12, linewidth=0
             )
-        panel.set_title(_words(name), fontsize=8, loc="left")
+        panel.set_title(" / ".join(filter(None, in_words(name))), fontsize=8, loc="left")
         panel.tick_params(labelsize=7)
         panel.set_xlabel("recording", fontsize=7)
     for panel in panels.flat[len(names) :]:

@@ -8,13 +8,14 @@ from typing import Any
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.result import why_no_load_torque
-from commissioner.monitor.trend.indicators import Indicator, Pulses
+from commissioner.monitor.trend.indicators import Indicator, Pulses, in_words
 from commissioner.monitor.trend.trend import FALSE_ALARM, History, Verdict
 from commissioner.motor.quantities import FIVE
 from commissioner.records import RPM
 from commissioner.report import band
 from commissioner.report.monitoring import figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
+from commissioner.report.sheet.numbers import digits, half_width, interval, like, with_interval
 
 _WIRING = {"crossed_channels": "channels are crossed", "polarity": "a channel is inverted"}
 
@@ -45,28 +46,29 @@ def page_of(
             _motor(seen, document),
             _audit(seen),
         ],
-        footer="Quantities are SI, per phase of the star equivalent; ± is one standard deviation. Method: C. J. Schantz, "
+        footer="Quantities are SI, per phase of the star equivalent; every ± is a 95 % interval. Method: C. J. Schantz, "
         "S. B. Leeb, Self-Sensing Induction Motors for Condition Monitoring.",
     )
 
 
 def _headline(seen: Observation, verdict: Verdict | None) -> str:
     period = seen.period
-    swing = 0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * RPM
-    text = f"{seen.mean_speed_rad_per_s * RPM:.2f} 1/min, moving by ±{swing:.3g} 1/min within the period, at {seen.mean_torque_nm:.3g} N m."
+    swing = digits(float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * RPM, 3)
+    text = f"{seen.mean_speed_rad_per_s * RPM:.2f} 1/min, moving by {swing} 1/min peak to peak within the period, at {digits(seen.mean_torque_nm, 3)} N m."
     if wiring := miswired(seen.findings):
         text = f"Check the probes: {' and '.join(_WIRING[f.code] for f in wiring)} (put right here, see the last section). {text}"
     if verdict is None:
         return text
-    return f"{text} Against its past: {verdict.state.value}{' (' + ', '.join(verdict.names) + ')' if verdict.names else ''}."
+    return f"{text} Against its past: {verdict.state.value}{' (' + ', '.join(in_words(n)[0] for n in verdict.names) + ')' if verdict.names else ''}."
 
 
 def _facts(seen: Observation, verdict: Verdict | None) -> list[tuple[str, str]]:
     return [
-        ("mean speed", f"{seen.mean_speed_rad_per_s * RPM:.3f} ± {max(seen.mean_speed_std * RPM, 5e-4):.3f} 1/min"),
+        ("mean speed", f"{with_interval(seen.mean_speed_rad_per_s * RPM, half_width(seen.mean_speed_std, RPM))} 1/min"),
         (
             "mean torque",
-            f"{seen.mean_torque_nm:.2f} ± {seen.mean_torque_std:.2f} N m ({seen.mean_torque_sensor_std:.2f} of it by sensor gain)",
+            f"{with_interval(seen.mean_torque_nm, half_width(seen.mean_torque_std))} N m "
+            f"(± {digits(half_width(seen.mean_torque_sensor_std), 2)} of it by sensor gain)",
         ),
         ("slip", f"{100 * seen.slip:.3f} %"),
         ("supply", f"{seen.lines.supply_rad_per_s / 6.283185307179586:.4f} Hz"),
@@ -104,7 +106,7 @@ def _shaft(seen: Observation) -> Section:
         "What the shaft does within the period",
         picture(
             figures.over_angle(seen),
-            "Speed, electromagnetic and load torque over shaft angle with two standard deviations." + known,
+            "Speed, electromagnetic and load torque over shaft angle with 95 % intervals." + known,
         ),
         picture(
             figures.polar(seen),
@@ -123,7 +125,7 @@ def _shaft(seen: Observation) -> Section:
             [
                 (
                     p.name,
-                    f"{p.frequency_hz:.5f} ± {p.frequency_std_hz:.5f}",
+                    with_interval(p.frequency_hz, half_width(p.frequency_std_hz)),
                     f"{p.ratio_to_shaft:.4f}",
                     f"{p.speed_ripple_rad_per_s * RPM:.3g}",
                     str(p.harmonics),
@@ -170,8 +172,8 @@ def _pulses(pulses: Pulses) -> Section:
         picture(
             figures.superimposed(pulses),
             f"{pulses.per_turn} pulses a turn, normalised. Area between them: "
-            f"{pulses.dissimilarity.value:.2f} ± {pulses.dissimilarity.std:.2f} % of a pulse; difference of their areas: "
-            f"{pulses.area_difference.value:.2f} ± {pulses.area_difference.std:.2f} %.",
+            f"{with_interval(pulses.dissimilarity.value, half_width(pulses.dissimilarity.std))} % of a pulse; difference of their "
+            f"areas: {with_interval(pulses.area_difference.value, half_width(pulses.area_difference.std))} %.",
         ),
     )
 
@@ -179,9 +181,9 @@ def _pulses(pulses: Pulses) -> Section:
 def _trend(verdict: Verdict, history: History, indicators: Sequence[Indicator]) -> Section:
     rows = [
         (
-            w.name,
-            f"{w.value:.4g}",
-            f"{w.healthy_mean:.4g} ± {w.healthy_std:.2g}",
+            " / ".join(filter(None, in_words(w.name))),
+            like(w.value, half_width(w.healthy_std)),
+            with_interval(w.healthy_mean, half_width(w.healthy_std)),
             f"{w.distance:+.1f}",
             f"{w.threshold:.1f}",
         )
@@ -197,10 +199,12 @@ def _trend(verdict: Verdict, history: History, indicators: Sequence[Indicator]) 
         "Against this machine's past",
         picture(
             figures.trend(history, indicators, verdict),
-            "Healthy recordings, those judged since, and this one (last point), with two standard deviations of a recording. "
+            "Healthy recordings, those judged since, and this one (last point), with the 95 % interval of a recording. "
             "Shaded: the range outside which an indicator alarms.",
         ),
-        Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
+        Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, note)
+        if rows
+        else note,
     )
 
 
@@ -209,11 +213,12 @@ def _motor(seen: Observation, document: Mapping[str, Any]) -> Section:
     return Section(
         "The motor as it runs now",
         Table(
-            ("parameter (inverse-Gamma circuit)", "value", "standard deviation"),
+            ("parameter (inverse-Gamma circuit)", "value", "95 % interval"),
             [
-                (q.name, f"{q.factor * found['value']:.4g} {q.unit}", f"{found['std'] / found['value']:.1%}")
+                (q.name, f"{shown} {q.unit}", f"± {half} {q.unit}")
                 for q in FIVE
                 for found in [parameters[q.field]]
+                for shown, half in [interval(q.factor * found["value"], half_width(found["std"], q.factor))]
             ],
             caption=f"Fitted to this recording, started from: {seen.start.origin}.",
         ),
@@ -229,7 +234,7 @@ def _audit(seen: Observation) -> Section:
         "What was found in the recording",
         Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones),
         f"Channels as used: {channels}.",
-        f"Sensors are trusted to {trust.gain_std:.1%} in gain. The currents were found to lag the voltages by "
-        f"{1e6 * seen.fitted.delay_s:.0f} ± {1e6 * seen.fitted.delay_std_s:.0f} µs of sensor delay (taken before: 0 ± "
-        f"{trust.skew_std_s * 1e6:.0f} µs). Beyond what was corrected, channels may differ by {trust.asymmetry:.1%}.",
+        f"Sensors are trusted to ± {digits(half_width(trust.gain_std, 100.0), 2)} % in gain. The currents were found to lag the voltages by "
+        f"{with_interval(1e6 * seen.fitted.delay_s, half_width(seen.fitted.delay_std_s, 1e6))} µs of sensor delay (taken before: 0 ± "
+        f"{digits(half_width(trust.skew_std_s, 1e6), 2)} µs). Beyond what was corrected, channels may differ by {trust.asymmetry:.1%}.",
     )

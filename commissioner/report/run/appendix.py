@@ -12,7 +12,7 @@ from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import digits, half_width, held, with_interval
-from commissioner.report.sheet.words import check_name, check_unit, seen_and_limit, spoken
+from commissioner.report.sheet.words import check_name, check_unit, seen_and_limit, spoken, typeset, with_symbols
 
 _TOLD: Mapping[str, Callable[[Record], str]] = {
     "state_entered": lambda r: f"{r['state']}{_on_axis(r)}: {r['because']}",
@@ -78,7 +78,7 @@ _CONVENTIONS: tuple[tuple[Text, Text], ...] = (
     ),
     ("Interval", "1.96 standard errors on each side. What has no interval has three digits."),
 )
-_TERMS: tuple[tuple[Text, Text], ...] = (
+_TERMS: tuple[tuple[str, str], ...] = (
     ("Noise of the current sensors", "in the interval; estimated from the residual of each test, widened where the residual is not white."),
     ("The inverter’s loss", "in the interval: fitted with the motor from the same samples, its law's doubt added."),
     ("Time between voltage and current", "in the interval: fitted as a delay common to a test."),
@@ -120,10 +120,10 @@ def _check(row: Record) -> tuple[Text, ...]:
     )
 
 
-def _checked(row: Record) -> tuple[str, str]:
+def _checked(row: Record) -> tuple[Text, Text]:
     unit = check_unit(str(row["name"]))
     seen, limit = seen_and_limit(row, unit)
-    return seen, limit.replace(" within", f" {unit}".rstrip() + " within")
+    return with_symbols(seen), with_symbols(limit.replace(" within", f" {unit}".rstrip() + " within"))
 
 
 def _event(line: Record) -> tuple[Text, ...]:
@@ -186,6 +186,8 @@ def _procedure(subject: Subject) -> Markup:
         here = f" (± {digits(half_width(value), 2)} % here)" if key.endswith("std_percent") else ""
         rows.append((key, f"{_set(key, value)}{here}"))
     figure = marks.figure("The circuit of this report, one axis", _CIRCUIT)
+    if not rows:
+        return figure
     return marks.section("Procedure, as run: the keys of its file", marks.facts(rows), figure, level=3)
 
 
@@ -225,7 +227,9 @@ def _circuit(subject: Subject) -> Markup:
 
 def uncertainty(subject: Subject) -> Markup:
     """Appendix C."""
-    terms = Markup("").join(Markup("<div><dt>{}</dt> <dd>{}</dd></div>").format(name, words) for name, words in _TERMS)
+    terms = Markup("").join(
+        Markup("<div><dt>{}</dt> <dd>{}</dd></div>").format(name, typeset(words)) for name, words in _TERMS
+    )
     parts = [Markup("<h2>C. Uncertainty</h2>"), Markup('<dl class="termlist flow">{}</dl>').format(terms)]
     if subject.tests and subject.parameters:
         columns = (

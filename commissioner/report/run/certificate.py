@@ -149,7 +149,7 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
         yield (
             "Energised in all",
             _energised(result),
-            f"{counted(len(subject.estimates), 'test')} begun",
+            _how_far(subject),
         )
         yield (
             "Written",
@@ -168,6 +168,13 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
     )  # fmt: skip
     total = f"{subject.samples:,}".replace(",", " ")
     yield "Samples lost", str(subject.gaps.lost_samples) if subject.gaps else "not known", f"of {total}"
+
+
+def _how_far(subject: Subject) -> str:
+    """What was energised: tests of tones, or what comes before them."""
+    if not subject.estimates and subject.samples:
+        return "direct current; no test begun"
+    return f"{counted(len(subject.estimates), 'test')} begun"
 
 
 def _apart(subject: Subject) -> tuple[Text, str, str]:
@@ -349,13 +356,7 @@ def _next(subject: Subject) -> Iterator[Text]:
     yield "Measure again when motor, cable or drive was changed."
     longer = subject.findings.longer_test
     if longer is not None:
-        yield spoken(
-            sentence(
-                longer.sentence.replace("standard errors", "intervals")
-                if "nothing" in longer.sentence
-                else longer.sentence
-            )
-        )
+        yield spoken(sentence(longer.sentence))
 
 
 def least_no_load_current_a(subject: Subject) -> tuple[float, float] | None:
@@ -398,13 +399,15 @@ def _unchecked(subject: Subject) -> Iterator[Text]:
             )
     done, planned = len(subject.tests), len(subject.planned_deg)
     if planned > done:
-        yield f"{planned - done} of {planned} tests: the run ended before"
+        yield f"{counted(planned - done, 'test')} of {planned}: the run ended before"
     yield "anything that turns: iron loss at speed, phase order, encoder"
     yield "insulation, earth, bearings, thermal protection"
-    yield "safe torque off: read as released, not tried"
+    checks = subject.result.get("checks") or ()
+    is_read = any("safe torque off" in row["name"] and row["has_passed"] and row["value"] is not None for row in checks)
+    yield f"safe torque off: {'read as released, ' if is_read else ''}not tried"
     if subject.is_good:
         yield Markup("{} of a warm rotor: about 0.4 % more for each kelvin").format(marks.R_R)
-    for row in subject.result.get("checks") or ():
+    for row in checks:
         if row["value"] is None and row["has_passed"]:
             yield f"{row['name']}: the drive does not tell"
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from commissioner.motor.quantities import in_shown_unit
-from commissioner.records import drive_words
+from commissioner.records import drive_words, plain_name
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
-from commissioner.report.sheet.numbers import counted, digits, signed
+from commissioner.report.sheet.numbers import counted, digits, held, signed
 from commissioner.report.sheet.words import seen_and_limit, spoken
 
 _COLUMNS = (
@@ -63,15 +63,20 @@ def _row(row: Record) -> tuple[Text, ...]:
     field = row["field"] if row["ours"] is not None else None
     unit = str(row["unit"])
     return (
-        str(row["name"]).replace("_", " "),
-        f"{digits(row['before'], 5)} {unit}",
-        f"{', '.join(digits(value, 5) for value in row['values'])} {unit}",
-        f"{digits(row['median'], 5)} {unit}",
+        plain_name(str(row["name"])),
+        f"{_own(row['before'])} {unit}",
+        f"{', '.join(map(_own, row['values']))} {unit}",
+        f"{_own(row['median'])} {unit}",
         f"{digits(row['spread_percent'], 2)} %",
         f"{signed(row['trend_percent'], 2)} %",
         f"{in_shown_unit(field, row['ours'])} ({row['conversion']})" if field else str(row["conversion"]),
         in_shown_unit(field, row["plate_low"], row["plate_high"]) if field else "not judged",
     )
+
+
+def _own(value: float) -> str:
+    """As the drive counts it: what is whole stays whole."""
+    return held(value) if value == round(value) else digits(value, 5)
 
 
 def _sentence(text: str) -> str:

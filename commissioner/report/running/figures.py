@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.estimation.fit import residuals, simulate
 from commissioner.estimation.record import STATES
-from commissioner.report.page import BLUE, GREEN, MUTED, ORANGE, RED, figure_of
+from commissioner.report.page import BLUE, GREEN, MUTED, ORANGE, RED, figure_of, legend_above
 from commissioner.running.search import Found
 
 if TYPE_CHECKING:
@@ -30,13 +30,13 @@ def over_each_other(found: Found) -> Figure:
         top.plot(t, window.current[part, 0], color=MUTED, linewidth=2.2, label="measured")
         top.plot(t, plain[part], color=ORANGE, linewidth=0.9, linestyle="--", label="plain simulation")
         top.plot(t, extended[part], color=BLUE, linewidth=0.9, label="with the named causes")
-        top.set_title("first periods" if column == 0 else "last periods, held out")
+        top.set_title("first periods" if column == 0 else "last periods, held out", loc="left")
         below.plot(t, window.current[part, 0] - plain[part], color=ORANGE, linewidth=0.9)
         below.plot(t, window.current[part, 0] - extended[part], color=BLUE, linewidth=0.9)
         below.set_xlabel("time / s")
     drawn[0, 0].set_ylabel("current alpha / A")
     drawn[1, 0].set_ylabel("measured - simulated / A")
-    drawn[0, 0].legend(ncols=3, loc="upper right", fontsize=7)
+    legend_above(drawn[0, 0])
     return figure
 
 
@@ -70,7 +70,7 @@ def over_time(found: Found) -> Figure:
     panel.set_yscale("log")
     panel.set_ylabel("residual / noise")
     panel.set_xlabel("time / s")
-    panel.legend(fontsize=7, ncols=3, loc="upper right")
+    legend_above(panel)
     return figure
 
 
@@ -91,5 +91,5 @@ def over_frequency(found: Found) -> Figure:
     panel.axhline(0.0, color=MUTED, linewidth=0.8, linestyle="--")
     panel.set_xlabel("frequency / Hz, negative: turns against the field")
     panel.set_ylabel("residual over noise / dB")
-    panel.legend(fontsize=7)
+    legend_above(panel)
     return figure

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from commissioner.estimation.fit import problem_of, simulate
-from commissioner.motor.circuit import QUANTILE
 from commissioner.records import RPM
-from commissioner.report.page import BLUE, MUTED, Page, Section, Table, figure_of, picture
+from commissioner.report.page import BLUE, MUTED, Page, Section, Table, figure_of, legend_above, picture
 from commissioner.report.running.figures import SHOWN_S
 from commissioner.report.running.page import NAMES
 from commissioner.report.running.words import Document, number
+from commissioner.report.sheet.numbers import half_width, interval
 from commissioner.running.identification import Identified
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def page_of(seen: Identified, document: Document, name: str) -> Page:
     """One self-contained page."""
     rows = [_row(q.name, document["parameters"].get(q.field) or document.get(q.field), q.factor, q.unit) for q in NAMES]
     facts = [
-        ("left by the model, of the noise", number(document["residual_over_noise"])),
+        ("left by the model", f"{number(document['residual_over_noise'])} × noise"),
         ("peak stator flux it holds at", f"{number(document['holds_for_stator_flux_wb'])} Wb"),
         ("speed", str(document["speed"])),
         ("recorded", f"{number(document['duration_s'])} s"),
@@ -43,8 +43,8 @@ def page_of(seen: Identified, document: Document, name: str) -> Page:
 def _row(label: str, measured: Any, factor: float, unit: str) -> tuple[str, str, str]:
     if measured is None:
         return label, "not in these data", ""
-    half = QUANTILE * factor * measured["std"] if measured["std"] else None
-    return label, f"{number(factor * measured['value'], 4)} {unit}", f"± {number(half, 2)} {unit}" if half else "–"
+    value, half = interval(factor * measured["value"], half_width(measured["std"], factor))
+    return label, f"{value} {unit}", f"± {half} {unit}" if half else "–"
 
 
 def _drawn(seen: Identified) -> Figure:
@@ -57,7 +57,7 @@ def _drawn(seen: Identified) -> Figure:
         time, measured = window.time_s[part], window.current[part, 0]
         drawn[0, column].plot(time, measured, color=MUTED, linewidth=2.2, label="measured")
         drawn[0, column].plot(time, current[part, 0], color=BLUE, linewidth=0.9, label="simulated")
-        drawn[0, column].set_title("first periods" if column == 0 else "last periods")
+        drawn[0, column].set_title("first periods" if column == 0 else "last periods", loc="left")
         drawn[1, column].plot(time, measured - current[part, 0], color=BLUE, linewidth=0.9)
         every = max(1, window.count // 2000)
         whole = slice(None, None, every) if column == 0 else part
@@ -71,5 +71,5 @@ def _drawn(seen: Identified) -> Figure:
     drawn[0, 0].set_ylabel("current alpha / A")
     drawn[1, 0].set_ylabel("measured - simulated / A")
     drawn[2, 0].set_ylabel("speed / (1/min)")
-    drawn[0, 0].legend(ncols=2, loc="upper right", fontsize=7)
+    legend_above(drawn[0, 0])
     return figure

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.motor.circuit import QUANTILE
 from commissioner.motor.quantities import FIVE, Quantity
 from commissioner.report.page import Page, Section, Table, Tone, picture
 from commissioner.report.running import figures
@@ -20,6 +19,8 @@ from commissioner.report.running.words import (
     spoken,
     tone,
 )
+from commissioner.report.sheet.numbers import half_width, with_interval
+from commissioner.report.sheet.words import quantity_name
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 
@@ -70,7 +71,7 @@ def _causes(document: Document) -> Section:
         return Section("Causes", "No cause can be named.")
     rows, tones = [], list[Tone]()
     for c in document["causes"]:
-        sizes = "; ".join(f"{spoken(k)} {quantity(v)}" for k, v in c["parameters"].items())
+        sizes = "; ".join(f"{quantity_name(k)} {quantity(v)}" for k, v in c["parameters"].items())
         rivals = sorted(c["alternatives"].items(), key=lambda item: float(item[1]))
         best = next(
             (
@@ -86,13 +87,21 @@ def _causes(document: Document) -> Section:
                 c["form"],
                 sizes,
                 f"{100 * c['gain_share']:.1f} %",
-                f"{number(c['strength_over_noise'])} x noise",
+                f"{number(c['strength_over_noise'])} × noise",
                 f"{100 * c['confidence']:.0f} %",
                 best,
             )
         )
         tones.append("warn" if c["equivalent"] or c["confidence"] < 0.8 else "good")
-    header = ("cause", "form", "size", "part of the error", "strength", "sure of the name", "best rival explains")
+    header = (
+        "cause",
+        "form",
+        "size",
+        "part of what they explain",
+        "strength",
+        "sure of the name",
+        "best rival explains",
+    )
     notes = [
         f"{CATALOGUE[c['name']].title}: {CATALOGUE[c['name']].physics}. Source: {CATALOGUE[c['name']].source}."
         for c in document["causes"]
@@ -124,7 +133,7 @@ def _where(seen: Diagnosis, document: Document) -> Section:
             figures.over_frequency(found),
             "What is left over frequency, 0 dB is chance. Left half: negative sequence.",
         ),
-        f"Left over the noise, by state: {states}." if states else "",
+        f"Left beyond the noise, in units of it, by state: {states}." if states else "",
     )
 
 
@@ -150,7 +159,7 @@ def _parameters(document: Document) -> Section:
         before, after = document["parameters_before"].get(q.field), document["parameters_after"].get(q.field)
         if before and after:
             values = [
-                f"{number(x['value'] * q.factor, 4)} ± {number(QUANTILE * x['std'] * q.factor, 2)} {q.unit}"
+                f"{with_interval(x['value'] * q.factor, half_width(x['std'], q.factor))} {q.unit}"
                 for x in (before, after)
             ]
             rows.append((q.name, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.motor.circuit import QUANTILE
 from commissioner.report.page import Tone
+from commissioner.report.sheet.numbers import half_width, with_interval
 from commissioner.running.causes import CATALOGUE
 
 Document = Mapping[str, Any]
@@ -19,6 +19,13 @@ UNITS = {"us": "µs", "ohm": "Ω"}
 def spoken(name: str) -> str:
     """`rotor_skin_effect` as `rotor skin effect`."""
     return name.replace("_", " ")
+
+
+def said(text: str) -> str:
+    """A sentence with the catalogue's names as people say them."""
+    for name in sorted(CATALOGUE, key=len, reverse=True):
+        text = text.replace(name, spoken(name))
+    return text
 
 
 def class_name(cause: Mapping[str, Any]) -> str:
@@ -40,7 +47,7 @@ def quantity(entry: Mapping[str, Any], *, short: bool = False) -> str:
     factor, tail = (100.0, " %") if unit == "" else (1.0, f" {UNITS.get(unit, unit)}")
     if short or not std:
         return f"{number(value * factor)}{tail}"
-    return f"{number(value * factor)} ± {number(QUANTILE * std * factor, 2)}{tail}"
+    return f"{with_interval(value * factor, half_width(std, factor))}{tail}"
 
 
 def main_size(cause: Mapping[str, Any]) -> str:
@@ -93,7 +100,7 @@ def meaning(document: Document) -> list[str]:
             str(document["reason"]),
             f"Seen: {error.get('value')}; expected: {error.get('limit')}; step: {error.get('step')}.",
         ]
-    out = [str(document["reason"])] if document["verdict"] in ("unexplained", "not_distinguishable") else []
+    out = [said(str(document["reason"]))] if document["verdict"] in ("unexplained", "not_distinguishable") else []
     return out + [f"{spoken(c['name']).capitalize()}: {CATALOGUE[c['name']].meaning}" for c in document["causes"]]
 
 

@@ -95,6 +95,6 @@ def _fonts() -> str:
             data = base64.b64encode(raw).decode("ascii")
             faces.append(
                 f"@font-face {{ font-family: Plex; src: url(data:font/woff2;base64,{data}) format('woff2'); "
-                f"font-weight: {weight}; font-display: block; unicode-range: {letters}; }}"
+                f"font-weight: {weight}; font-display: swap; unicode-range: {letters}; }}"
             )
     return "\n".join(faces)

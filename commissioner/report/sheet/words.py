@@ -20,8 +20,9 @@ UNITS: Mapping[str, tuple[str, int]] = {
     "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
 }  # fmt: skip
 """Of what a check sees, by the check's plain name; and its decimals."""
-_SIGNS = (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ"))
+_SIGNS = (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ"), ("->", "→"))
 _MOST_DIGITS = 9
+UNIT_ENDINGS = ("_a_per_min", "_rad_per_s", "_ppm", "_us", "_ms", "_wb", "_nf", "_hz_a", "_v", "_a", "_s")
 
 
 def check_name(check: str) -> str:
@@ -67,3 +68,13 @@ def _shown(value: object, count: int) -> str:
     if value is None or value == "":
         return "—"
     return digits(value, count) if isinstance(value, float) else typeset(str(value))
+
+
+def quantity_name(key: str) -> str:
+    """`half_current_a` without the unit that the value carries anyway."""
+    for ending in UNIT_ENDINGS:
+        if key.endswith(ending):
+            key = key.removesuffix(ending) + ("_hz" if ending == "_hz_a" else "")
+            break
+    words = key.replace("_", " ").replace(" hz", " Hz")
+    return words.removeprefix("gain ").replace(" over ", " against ") if words.startswith("gain ") else words

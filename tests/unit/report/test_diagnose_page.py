@@ -13,9 +13,10 @@ from commissioner.diagnose.search.screening import Score, Screening
 from commissioner.diagnose.verdict.collinearity import look_alikes
 from commissioner.diagnose.verdict.residuals import residuals
 from commissioner.report.diagnosis import figures
-from commissioner.report.diagnosis.numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
+from commissioner.report.diagnosis.numbers import limit_words, number, part_word, percent, quantity, sure
 from commissioner.report.diagnosis.words import headline, next_promise, next_sentence
 from commissioner.report.page import picture
+from commissioner.report.sheet.words import quantity_name
 
 PERIOD, SAMPLES, SIGMA = 2.5e-4, 4000, 0.01
 TONES = (4.0, 20.0, 90.0)

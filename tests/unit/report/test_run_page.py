@@ -11,6 +11,7 @@ from commissioner.identify.estimate.axes import Combined
 from commissioner.identify.estimate.common_ground import Result
 from commissioner.motor.circuit import InverseGamma
 from commissioner.procedure.steps import Findings
+from commissioner.records import SampleBlock
 from commissioner.report.run.page import run_page
 
 PLAN = {
@@ -252,8 +253,36 @@ def test_a_tuned_result_has_its_unit_in_every_column():
         "remedy": "look",
     }
     text = words(run_page(result("faulted", written=False, tune=tune, error=error), JOURNAL, Findings()))
-    for told in ("3200.0 mohm", "3716.0, 3720.0 mohm", "3.718 Ω (per phase)", "0.5 ... 12 Ω", "15.2 A", "one time"):
+    for told in ("3200 mohm", "3716, 3720 mohm", "3.718 Ω (per phase)", "0.5 ... 12 Ω", "15.2 A", "one time"):
         assert told in text, told
+
+
+def test_a_run_that_ended_in_the_direct_currents_was_energised_and_says_so():
+    lost = result("faulted", written=False, parameters={}, reason="the drive sends no samples")
+    block = SampleBlock(1, 0, 2e-4, 0.0, np.ones(5), np.ones(5), -np.ones(5), None, 540.0)
+    assert "direct current; no test begun" in words(run_page(lost, JOURNAL, Findings(blocks=[(0, block)])))
+    assert "no tests begun" in words(run_page(lost, JOURNAL, Findings()))
+
+
+def test_safe_torque_off_is_read_as_released_only_where_it_was_read():
+    sto = {"name": "safe torque off is released", "has_passed": True, "value": True, "limit": True, "remedy": ""}
+    assert "safe torque off: read as released, not tried" in words(first_page(result(checks=[sto]))[0])
+    text = words(first_page(result("aborted", written=False, parameters={}, checks=[]))[0])
+    assert "safe torque off: not tried" in text
+    assert "three tests of 3: the run ended before" in text
+
+
+def test_a_check_of_a_parameter_has_its_symbol():
+    slow = {
+        "name": "the link keeps up", "has_passed": True, "value": "L_M up to half as large again", "limit": "x", "remedy": ""
+    }  # fmt: skip
+    assert "L<sub>M</sub> up to half" in run_page(result(checks=[slow]), JOURNAL, Findings())
+
+
+def test_every_head_of_a_table_says_what_it_heads():
+    heads = re.findall(r"<th\b[^>]*>", run_page(result(), JOURNAL, Findings(), years=history(40)))
+    assert heads
+    assert all('scope="col"' in head or 'scope="row"' in head for head in heads)
 
 
 def test_a_fault_after_writing_says_how_to_get_the_old_values_back():
@@ -333,9 +362,9 @@ def test_two_runs_have_no_change_a_year_and_none_no_sheet():
     assert "over the years" not in words(run_page(result(), JOURNAL, Findings()))
 
 
-@pytest.mark.parametrize(("axes", "tests"), [([0.0], 1), ([0.0, 60.0], 3)])
+@pytest.mark.parametrize(("axes", "tests"), [([0.0], "one test of 1"), ([0.0, 60.0], "three tests of 3")])
 def test_one_axis_alone_is_not_repeated(axes, tests):
     journal = [JOURNAL[0], line("job", {"plan": PLAN | {"axes_deg": axes}, "nameplate": PLATE}), *JOURNAL[2:]]
     text = words(run_page(result(), journal, Findings()))
-    assert f"{tests} of {tests} tests: the run ended before" in text
-    assert ("the first again" in text) is (tests > 1)
+    assert f"{tests}: the run ended before" in text
+    assert ("the first again" in text) is (len(axes) > 1)

@@ -118,7 +118,27 @@ def test_a_printed_card_breaks_between_its_figures_and_no_heading_stands_alone()
     """A section that may not break leaves most of the page before it blank."""
     text = page.render(page.Page("t", "h", "plain", [], [page.Section("s", page.Table(("a",), [("1",)]))]))
     printed = text[text.index("@media print") :].partition("</style>")[0]
-    assert "header,figure,tr { break-inside:avoid }" in printed
+    assert "header,figure,tr,section:not(:has(figure,table)) { break-inside:avoid }" in printed
     assert "h2,thead { break-after:avoid }" in printed
     assert "section { break-inside" not in printed
     assert '<th scope="col">a</th>' in text
+
+
+def test_what_has_happened_since_stands_on_the_first_printed_page_and_letters_wait_for_no_font():
+    text = page.with_notice(
+        document("a", Margins("s", "", "r", "", ""), [Page("x", "X", Markup("<h1>b</h1>"))]), "since"
+    )
+    assert re.search(r'<section class="notice"><p>since</p></section><section class="pg"', text)
+    assert re.search(r"@media print .*\.notice \+ \.pg \{ break-before: auto; \}", text, re.S)
+    assert "font-display: swap" in text
+    assert "font-display: block" not in text
+
+
+def test_a_legend_hides_no_curve():
+    figure, drawn = page.figure_of(1, 1, 3.0)
+    drawn[0, 0].plot([0.0, 1.0], [0.0, 1.0], label="measured")
+    page.legend_above(drawn[0, 0])
+    figure.draw_without_rendering()
+    legend, curves = drawn[0, 0].get_legend().get_window_extent(), drawn[0, 0].get_window_extent()
+    assert legend.y0 >= curves.y1
+    assert legend.x1 <= figure.bbox.x1

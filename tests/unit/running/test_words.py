@@ -1,6 +1,6 @@
 """What a technician reads of a running diagnosis."""
 
-from commissioner.report.running.words import headline, quantity, sentence
+from commissioner.report.running.words import headline, quantity, said, sentence
 
 CAUSE = {
     "name": "stator_asymmetry", "equivalent": [], "form": "phase v", "confidence": 0.99, "gain_share": 1.0,
@@ -31,3 +31,10 @@ def test_the_headline_states_the_share_that_was_kept_aside():
         "causes": [{**document["causes"][0], "strength_over_noise": 0.072}],
     }  # fmt: skip
     assert "too small to matter: 0.072 of the noise" in headline(small) and "explains" not in headline(small)
+
+
+def test_no_key_of_a_cause_and_no_digit_beyond_the_interval_is_shown():
+    assert said("These data cannot tell apart: sampling_delay or sensor_lag.") == (
+        "These data cannot tell apart: sampling delay or sensor lag."
+    )
+    assert quantity({"value": 4.7912, "std": 0.66, "unit": "us"}) == "4.8 ± 1.3 µs"

@@ -1,9 +1,17 @@
 """Sizes of causes as the page writes them."""
 
+from importlib.resources import files
+from types import SimpleNamespace
+
 import pytest
 
+from commissioner.identify.estimate.axes import Cause
+from commissioner.identify.excite.duration import LongerTest
+from commissioner.identify.intake.alignment import TimeShift
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.report.sheet.words import NBSP
-from commissioner.service.page.texts import Texts
+from commissioner.service.page.frame import environment, words_of
+from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import Words
 
 
@@ -27,3 +35,40 @@ OFFSETS = {f"offset_{phase}_a": size(a, 4.95e-5, "A") for phase, a in zip("uvw",
 )  # fmt: skip
 def test_the_first_size_is_shown_and_what_is_measured_alike_to_the_digits_of_its_error(sizes, shown):
     assert Words(Texts("en")).size(sizes).replace(NBSP, " ") == shown
+
+
+def test_what_the_core_remarks_of_every_run_has_its_german():
+    german = Texts("de")
+    remarks = (
+        LongerTest(8.0, (0.002,) * 4, (0.001,) * 4).sentence, LongerTest(8.0, (0.002,) * 4, (0.002,) * 4).sentence,
+        TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
+        RESTORED_SINCE, ACCEPTED, "as before, read back", "no load current", "not identified",
+        "Schneider Altivar ATV320, serial number not known",
+        "orientations: 2; sensor gain and anisotropy need at least three",
+        "the tests reached 0.685 Wb; from there to 0.731 Wb, the level that L_M is told for, their own magnetizing curve leads; a "
+        "quarter of the way is in L_M's standard error",
+    )  # fmt: skip
+    assert [remark for remark in remarks if not german.knows(remark)] == []
+
+
+def test_the_live_line_speaks_the_language_of_its_page():
+    script = files("commissioner.service.page").joinpath("static", "js", "page.js").read_text("utf-8")
+    assert "?lang=${root.lang}" in script
+    line = SimpleNamespace(cookies={}, query_params={"lang": "de"}, headers={"accept-language": "en-US"})
+    assert texts_of(line).language == "de"
+
+
+@pytest.mark.parametrize(("plate_low", "is_compared"), [(None, False), (0.5, True)])
+def test_a_tuning_agrees_with_the_plate_only_where_it_was_compared_with_it(plate_low, is_compared):
+    row = {
+        "name": "stator_resistance", "unit": "raw", "before": 1.0, "median": 2.0, "spread_percent": 0.1, "change_percent": None,
+        "ours": plate_low, "plate_low": plate_low, "plate_high": plate_low,
+    }  # fmt: skip
+    words = {**words_of("en"), "losses": ()}
+    template = environment().get_template("work/tuned.html")
+    result = {"outcome": "commissioned", "tune": {"rows": [row], "repeats": [{}]}, "reason": "x"}
+    parts = environment().get_template("frame/parts.html").make_module(words)
+    context = template.new_context({**words, "p": parts, "result": result, "tune": result["tune"], "good": True})
+    said = "".join(template.blocks["main"](context))
+    assert "tunings agree with" in said
+    assert ("agree with the plate" in said) is is_compared

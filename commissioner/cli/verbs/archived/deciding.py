@@ -7,7 +7,7 @@ from pathlib import Path
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
 from commissioner.operations import archive, closing, write
-from commissioner.records import drive_words
+from commissioner.records import drive_words, plain_name
 from commissioner.run.archive.seal import read_key
 from commissioner.run.holding.priority import lower_priority
 from commissioner.run.write_accepted import Plan, as_document
@@ -38,11 +38,15 @@ def restore_run(
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
-    rows = [(w.name, f"{w.before:.5g}", f"{w.after:.5g}", f"{w.read_back:.5g}") for w in done.written]
+    rows = [(plain_name(w.name), f"{w.before:.5g}", f"{w.after:.5g}", f"{w.read_back:.5g}") for w in done.written]
     if rows:
-        screen.out.print(screen.table("", ("parameter", "before", "written", "read back"), rows, right=(1, 2, 3)))
+        screen.out.print(
+            screen.table(
+                "", ("parameter, as the drive counts it", "before", "written", "read back"), rows, right=(1, 2, 3)
+            )
+        )
     screen.out.print(
-        f"[green]snapshot restored, {screen.kept(done.is_stored)}[/]"
+        f"[green]the values before the run are restored, {screen.kept(done.is_stored)}[/]"
         if rows
         else "the drive held the snapshot's values already"
     )
@@ -80,7 +84,10 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
     if as_json:
         screen.emit(as_document(plan))
         return
-    rows = [(str(r.register), r.name, f"{r.now:.6g}", f"{r.will_be:.6g}", r.unit, r.convention) for r in plan.rows]
+    rows = [
+        (str(r.register), plain_name(r.name), f"{r.now:.6g}", f"{r.will_be:.6g}", r.unit, plain_name(r.convention))
+        for r in plan.rows
+    ]
     screen.out.print(f"[bold]{screen.text(drive_words(plan.drive_type, plan.serial_number))}[/]")
     header = ("register", "parameter", "now", "will be", "unit", "convention")
     screen.out.print(screen.table("", header, rows, right=(2, 3)))

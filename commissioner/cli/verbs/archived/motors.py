@@ -100,7 +100,7 @@ def _name(archive: Archive, run: str, tag: str, serial: str, *, confirm: bool, a
 def _show(done: MotorTrend) -> None:
     screen.out.print(f"[bold]{screen.text(done.motor)}[/]")
     rows = [
-        (one.name, str(len(one.points)), screen.quantity(one.level, QUANTILE * one.level_std, one.unit),
+        (one.name, str(len(one.points)), screen.quantity(one.level, one.level_std, one.unit),
          "" if one.slope_per_year is None else f"{100 * one.slope_per_year:+.2g} ± {100 * QUANTILE * (one.slope_std or 0.0):.1g} %",
          str(len(one.steps)), "[red]alarm[/]" if one.is_alarm else "")
         for one in done.found.trends

@@ -18,7 +18,7 @@ def test_errors_of_noise_alone_fall_with_the_root_of_the_time():
     longer = predict((0.001, 0.002, 0.003, 0.004))
     assert longer.seconds == 8.0
     assert longer.then == pytest.approx([s / 2**0.5 for s in (0.001, 0.002, 0.003, 0.004)])
-    assert "R_s 0.1 to 0.071 %" in longer.sentence
+    assert "95 % intervals (±): R_s 0.2 -> 0.14 %, " in longer.sentence
 
 
 def test_errors_that_are_not_noise_stay_and_the_sentence_says_so():

@@ -25,8 +25,8 @@ const tell = (kind, fact) => { for (const act of listeners[kind] ?? []) act(fact
 function connect() {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const path = place.run ? `/api/runs/${encodeURIComponent(place.run)}/control` : "/api/control";
-  const query = place.drive ? `?drive=${encodeURIComponent(place.drive)}` : "";
-  socket = new WebSocket(`${scheme}://${location.host}${path}${query}`);
+  const query = place.drive ? `&drive=${encodeURIComponent(place.drive)}` : "";
+  socket = new WebSocket(`${scheme}://${location.host}${path}?lang=${root.lang}${query}`);
   socket.addEventListener("message", (event) => {
     heardAt = performance.now();
     if (isOffline) online();
