@@ -172,3 +172,13 @@ def test_the_plate_is_asked_of_a_short_stretch(tmp_path: Path) -> None:
     refused = monitor(MonitorRequest(path))
     assert isinstance(refused, NotMonitored) and "do not belong to this plate" in refused.error.what
     assert not any("mean_torque_nm" in state for state in refused.document["states"])
+
+
+def test_a_line_beyond_the_slip_that_the_power_allows_is_no_shaft(tmp_path: Path) -> None:
+    """A pulse pattern's half supply period, 2 in a thousand above synchronous speed: taken for the shaft, a motor became a generator."""
+    made = even()
+    beyond = 1.0 + 0.02 * np.cos(2 * np.pi * 25.05 * made["time_s"])
+    made |= {f"current_{p}_a": made[f"current_{p}_a"] * beyond for p in "uvw"}
+    document = watched(tmp_path, made, PLATE).document
+    assert document["mean_speed_rad_per_s"]["value"] < 50 * np.pi
+    assert document["mean_torque_nm"]["value"] > 5.0
