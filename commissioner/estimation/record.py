@@ -110,7 +110,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     period = recordings[0].sample_period_s
     windows: list[Window] = []
     remarks: list[str] = []
-    has_speed = all(r.speed_rad_per_s is not None for r in recordings)
+    has_speed = all(r.speed_rad_per_s is not None and np.isfinite(r.speed_rad_per_s).any() for r in recordings)
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
     has_zero = not computed and all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
     sigmas, without = [], set("uvw") if computed else set[str]()
@@ -146,6 +146,11 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
                 remarks.append(
                     f"{one.source}: shaft and supply turn against each other: the speed's sign is taken for wrong."
                 )
+        lost = 0 if speed is None or not has_speed else int(np.count_nonzero(~np.isfinite(speed)))
+        if lost:
+            remarks.append(
+                f"{one.source}: {lost} samples have no speed: the stretches used end there and begin behind it."
+            )
         windows += _windows(signed, current, voltage, plate, has_speed, scales)
     if not windows:
         raise _refused(
@@ -189,6 +194,7 @@ def _refused(what: str, value: object, limit: object, remedy: str) -> DataRefuse
 def noise_of(x: Array) -> float:
     """Standard deviation of white noise from sixth differences, which no harmonic of the supply passes (robust)."""
     d = np.diff(x, 6)
+    d = d[np.isfinite(d)]
     return float(np.median(np.abs(d)) / 0.6745 / np.sqrt(924.0)) if d.size else 0.0
 
 
@@ -282,8 +288,11 @@ def _jumps(voltage: Array, scales: Scales) -> Bools:
 def _windows(
     one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales
 ) -> Iterator[Window]:
-    """Stretches without gap, with voltage and current: they begin one sample after a closing and end before the poles open one by one."""
-    finite: Bools = np.asarray(np.isfinite(np.hstack([current, voltage])).all(axis=1))
+    """Stretches without gap, with voltage and current, with speed where there is one: they begin one sample after a closing and end before the poles open one by one."""
+    seen = [current, voltage]
+    if has_speed and one.speed_rad_per_s is not None:
+        seen.append(one.speed_rad_per_s[:, None])
+    finite: Bools = np.asarray(np.isfinite(np.hstack(seen)).all(axis=1))
     raw, size = np.hypot(*voltage.T), np.nan_to_num(np.hypot(current[:, 0], current[:, 1]))
     flows = size > OFF_CURRENT * min(scales.current_a, float(np.quantile(size, 0.9)))
     pole = round(OPENING_S / one.sample_period_s)

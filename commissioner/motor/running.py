@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from commissioner.compiled import njit
 from commissioner.motor.circuit import InverseGamma, from_t_model, to_t_model
@@ -97,6 +97,18 @@ def slip_at_current(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float
     if excess(low) >= 0.0:
         return low
     return high if excess(high) <= 0.0 else float(brentq(excess, low, high))
+
+
+def slip_at_lag(circuit: TCircuit, supply_rad_per_s: float, lag_rad: float) -> float:
+    """The slip up to that of the best power factor at which the current lags by `lag_rad`."""
+
+    def lag(slip: float) -> float:
+        return float(np.angle(stator_impedance(circuit, supply_rad_per_s, slip)))
+
+    best = float(minimize_scalar(lag, bounds=(0.0, pull_out_slip(circuit, supply_rad_per_s)), method="bounded").x)
+    if lag_rad <= lag(best):
+        return best
+    return 0.0 if lag_rad >= lag(0.0) else float(brentq(lambda slip: lag(slip) - lag_rad, 0.0, best))
 
 
 STARTING_CURRENT = 6.5

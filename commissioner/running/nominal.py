@@ -20,6 +20,8 @@ RUN_UP_TORQUE = 2.0
 """Mean accelerating torque of a start, of rated."""
 RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
 """Of an encoder, at the shaft's frequency."""
+LOAD_RIPPLE = ("load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_ripple_sin_2")
+"""Of a load, once and twice a turn; like friction it takes torque from a shaft that turns, and drives none that stands."""
 STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))
 """Factors on the plate's four, tried in turn until one leaves the valley where R_s is near zero."""
 WRONG_VALLEY = 300.0
@@ -115,12 +117,12 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
                 )
                 machine = _settled(problem.cut(seconds), machine, own)
     if smooth_load:
-        numbers = (*numbers, "load_constant", "load_fan", "load_ripple_cos", "load_ripple_sin")
+        numbers = (*numbers, "load_constant", "load_fan", *LOAD_RIPPLE)
         return refine(problem, machine, columns_of(numbers, record, machine), most=25)
     return refine(
         problem,
         machine,
-        columns_of((*numbers, "load_ripple_cos", "load_ripple_sin"), record, machine, knots=True),
+        columns_of((*numbers, *LOAD_RIPPLE), record, machine, knots=True),
         most=25,
     )
 

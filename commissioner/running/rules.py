@@ -39,8 +39,8 @@ class Rules:
     Of 20 such cases five false names were weaker, and of the true ones only those below what counts for recall."""
 
     material_unheld_sigma: float = 0.1
-    """The same where the speed is that of a fitted load: nothing is held out, and what the load's law lacks (a ripple of 6 % that started with
-    the shaft left 0.0305 of the noise) passes for saturation. A third of what counts for recall."""
+    """The same where the speed is that of a fitted load: nothing is held out, and what the load's law lacks (a ripple that drove the
+    shaft at rest, without its second order, left 0.0305 of the noise; more than two a turn are lacking still) passes for saturation. A third of what counts for recall."""
 
 
 RULES = Rules()

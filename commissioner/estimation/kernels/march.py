@@ -228,8 +228,10 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 low = min(int(places[m]), knots.shape[0] - 2)
                 part = places[m] - low
                 load = knots[low] * (1.0 - part) + knots[low + 1] * part
-                load += p[CONSTANT] * share / np.sqrt(share * share + 1e-4) + p[FAN] * share * share
-                load += p[RIPPLE] * np.cos(y[9] / pairs) + p[RIPPLE + 1] * np.sin(y[9] / pairs)
+                c, s = np.cos(y[9] / pairs), np.sin(y[9] / pairs)
+                turning = p[CONSTANT] + p[RIPPLE] * c + p[RIPPLE + 1] * s
+                turning += p[RIPPLE + 2] * (c * c - s * s) + p[RIPPLE + 3] * 2.0 * s * c
+                load += turning * share / np.sqrt(share * share + 1e-4) + p[FAN] * share * share
                 k[stage, 8] = per_inertia * (torque / torque_n - load)
             k[stage, 9] = w
         if q < n - 1:

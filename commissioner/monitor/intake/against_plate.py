@@ -9,6 +9,7 @@ from dataclasses import replace
 from commissioner.monitor.intake.findings import Audited, Finding, miswired
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, disagreement, doubt
+from commissioner.motor.running import from_nameplate, slip_at_lag
 from commissioner.records import ReadingNote, RunningRecording
 
 VOLTS_PER_HERTZ = (0.1, 4.0)
@@ -16,7 +17,11 @@ VOLTS_PER_HERTZ = (0.1, 4.0)
 
 
 def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Contradiction | None:
-    """The contradiction between what was measured at the shaft's slip and the plate; None where there is none to be seen."""
+    """The contradiction between what was measured at the shaft's slip and the plate; None where there is none to be seen.
+
+    Where the shaft was not seen (None), at the slip at which the plate's motor has this power factor: a common factor of the
+    currents leaves that as it is.
+    """
     point = _point(audited, shaft_hz, plate)
     return None if point is None else contradiction(point, plate)
 
@@ -45,11 +50,15 @@ def doubt_of(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Find
 
 
 def _point(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> OperatingPoint | None:
-    """What was measured at the shaft's slip; None where the shaft, or a slip of a machine that works, is not seen."""
+    """What was measured, at the shaft's slip or that of the power factor; None where no slip of a machine that works is seen."""
     seen = audited.fundamental
-    if seen is None or shaft_hz is None:
+    if seen is None or seen.frequency_hz <= 0.0:
         return None
-    slip = 1.0 - plate.pole_pairs * shaft_hz / seen.frequency_hz
+    if shaft_hz is None:
+        lag = math.atan2(seen.reactive_var, seen.power_w)
+        slip = slip_at_lag(from_nameplate(plate), 2.0 * math.pi * seen.frequency_hz, lag)
+    else:
+        slip = 1.0 - plate.pole_pairs * shaft_hz / seen.frequency_hz
     if slip == 0.0 or abs(slip) >= 0.5:
         return None
     return OperatingPoint(

@@ -24,6 +24,8 @@ DRIFT_DEGREE = 4
 clock), only as far as its coefficients stand out. Where it does, the frequency that captures most is not the mean one."""
 DRIFT_KNOWN = 0.1
 """Relative error of the drift's mean: coefficients below three deviations were dropped."""
+OUTSIDE_SIGMA = 4.0
+"""Of a line's frequency, from which it lies beyond the slip that the power allows."""
 
 
 @dataclass(frozen=True)
@@ -78,18 +80,24 @@ def _again(frame: TurningFrame, part: slice, alone: Vector, spectrum: PairSpectr
 def _find_shaft(
     frame: TurningFrame, part: slice, residual: Vector, spectrum: PairSpectrum, search: ShaftSearch
 ) -> tuple[Periodicity | None, tuple[tuple[float, float], ...]]:
+    """The best comb of the slip range whose lines do not lead out of it: half a supply period is a pulse pattern's own, too."""
     candidates = periods.shaft_candidates(spectrum, search, periods.search_harmonics(frame.band_hz, search))
     table = tuple((f, score) for f, score, _ in candidates)
-    for frequency, _, visible in candidates[:1]:
+    low, high = periods.range_hz(search)
+    for frequency, _, visible in candidates:
         seen = tuple(
             h
             for h in visible
             if _is_peak(spectrum, h * frequency) and not _on_mains_skirt(h * frequency, search.supply_hz)
         )
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
-        if powers.max() > periods.SHAFT_SIGNIFICANT or powers.sum() > 2 * periods.SHAFT_SIGNIFICANT:
-            top = periods.top_of_line(spectrum, frequency, seen)
-            return _refined(frame, part, residual, spectrum, "shaft", top, seen), table
+        if powers.max() <= periods.SHAFT_SIGNIFICANT and powers.sum() <= 2 * periods.SHAFT_SIGNIFICANT:
+            break
+        top = periods.top_of_line(spectrum, frequency, seen)
+        shaft = _refined(frame, part, residual, spectrum, "shaft", top, seen)
+        beside = OUTSIDE_SIGMA * shaft.frequency_std_hz
+        if low - beside <= shaft.frequency_hz <= high + beside:
+            return shaft, table
     return None, table
 
 

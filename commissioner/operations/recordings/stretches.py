@@ -7,6 +7,7 @@ from typing import cast
 
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
+from commissioner.monitor.intake.against_plate import against_plate, doubt_of, of_contradiction, over_currents
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
@@ -36,12 +37,11 @@ def in_its_states(
         recording = replace(recording, notes=(*recording.notes, ReadingNote(carrier.code, carrier.what)))
     stretches = states(recording, plate)
     if {s.state for s in stretches} <= {"steady", "lost"}:
-        seen = observe(recording, plate, wishes)
+        seen = _watched(recording, plate, wishes)
         out = [as_state(s, used=s.state == "steady") for s in stretches]
-        if isinstance(seen, Refused) and seen.reason.code in SILENT:
-            for stretch, state in zip(stretches, out, strict=True):
-                if stretch.state == "steady":
-                    _add_own(state, recording, stretch, plate, wishes, is_watched=True)
+        for state in out:
+            if state["state"] == "steady" and isinstance(seen, Refused):
+                _add_own(state, seen, plate)
         return seen, recording, out
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
@@ -55,11 +55,12 @@ def in_its_states(
     note = ReadingNote(
         "states", f"{_listed(stretches)}: the answer is of the steady {_span(longest)}, what is beside it was not used"
     )
-    seen = observe(replace(part, notes=(*part.notes, note)), plate, wishes)
+    seen = _watched(replace(part, notes=(*part.notes, note)), plate, wishes)
     out = [as_state(s, used=s is longest) for s in stretches]
     for stretch, state in zip(stretches, out, strict=True):
         if stretch in steady:
-            _add_own(state, recording, stretch, plate, wishes, is_watched=stretch is longest)
+            own = seen if stretch is longest else _watched(cut_out(recording, stretch, MARGIN_S), plate, wishes)
+            _add_own(state, own, plate)
     return seen, part, out
 
 
@@ -77,19 +78,31 @@ def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
     )  # fmt: skip
 
 
-def _add_own(
-    state: State, recording: RunningRecording, stretch: Stretch, plate: Nameplate, wishes: Wishes, *, is_watched: bool
-) -> None:
-    """What a steady stretch says: as the chain has it, else, of a short one, as its terminals do, and why no more."""
-    part = cut_out(recording, stretch, MARGIN_S)
-    if not is_watched:
-        own = observe(part, plate, wishes)
-        if isinstance(own, Observation):
-            state["mean_speed_rad_per_s"] = {"value": own.mean_speed_rad_per_s, "std": own.mean_speed_std}
-            state["mean_torque_nm"] = {"value": own.mean_torque_nm, "std": own.mean_torque_std}
-            return
-        state["withheld"] = f"from current, voltage and plate only: {own.reason.what}"
-    terminal = from_terminals(part, plate, stretch.frequency_hz)
+def _watched(part: RunningRecording, plate: Nameplate, wishes: Wishes) -> Observation | Refused:
+    """As the chain sees it. Where only the terminals are left to tell a torque, the plate is asked without the shaft."""
+    seen = observe(part, plate, wishes)
+    if isinstance(seen, Observation) or seen.reason.code not in SHORT | SILENT:
+        return seen
+    against, said = against_plate(seen.audited, None, plate), doubt_of(seen.audited, None, plate)
+    if against is not None:
+        if wishes.trust == "plate" and against.likely is not None:
+            return observe(over_currents(part, against.likely), plate, replace(wishes, trust=None))
+        said = of_contradiction(against, stops=wishes.trust != "data")
+    if said is None:
+        return seen
+    audited = replace(seen.audited, findings=(*seen.audited.findings, said))
+    return Refused(audited, said if said.stops else seen.reason, audited.findings)
+
+
+def _add_own(state: State, seen: Observation | Refused, plate: Nameplate) -> None:
+    """What a steady stretch says: as the chain has it, else, of a short or even one, as its terminals do, and why no more."""
+    if isinstance(seen, Observation):
+        state["mean_speed_rad_per_s"] = {"value": seen.mean_speed_rad_per_s, "std": seen.mean_speed_std}
+        state["mean_torque_nm"] = {"value": seen.mean_torque_nm, "std": seen.mean_torque_std}
+        return
+    of_terminals_alone = seen.reason.code in SHORT | SILENT
+    state["withheld"] = ("from current, voltage and plate only: " if of_terminals_alone else "") + seen.reason.what
+    terminal = from_terminals(seen.audited.fundamental, plate) if of_terminals_alone else None
     if terminal is not None:
         state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}

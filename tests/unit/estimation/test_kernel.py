@@ -175,3 +175,17 @@ def test_saturation_of_the_air_gaps_flux_is_that_of_the_t_circuit():
             psi = psi + PERIOD / 6.0 * (a + 2.0 * (b + c) + d)
     found = run(p, count, is_free=False)[0]
     assert np.abs(found[:, 0] + 1j * found[:, 1] - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns():
+    """Without voltage. At rest none of its torque moves the shaft; turning with W, a cos(2 theta) of it swings the speed by a T / (2 J W)."""
+    p, count, x = numbers({"load_ripple_cos": 0.06, "load_ripple_cos_2": 0.03, "inertia": 0.1}), 500, np.zeros(STATES)
+    t = 0.5 * PERIOD * np.arange(2 * count - 1)
+    none, knots = np.zeros((t.size, 2)), np.zeros(2)
+    out, shaft = np.empty((count, 3)), np.empty((count, 2))
+    march(p, SCALES.as_tuple(), x.copy(), none, none, knots, np.zeros(t.size), PERIOD, True, out, shaft)
+    assert np.abs(shaft[:, 0]).max() == 0.0
+    x[8], p[AT["load_ripple_cos"]] = 300.0, 0.0
+    march(p, SCALES.as_tuple(), x, none, none, knots, np.zeros(t.size), PERIOD, True, out, shaft)
+    swing = -0.03 * 26.0 / 0.1 / (2 * 150.0) * np.sin(2 * 150.0 * t[::2])
+    assert (shaft[:, 0] - 300.0) / 2 == pytest.approx(swing, abs=0.02 * np.abs(swing).max())

@@ -133,3 +133,18 @@ def test_a_window_ends_before_the_contactor_opens_whatever_voltage_the_field_kee
     (window,) = prepare([recording], PLATE).windows
     begins = made.time_s[101]
     assert begins + window.count * recording.sample_period_s == pytest.approx(1.6 - OPENING_S, abs=3 * 2e-4)
+
+
+def test_a_gap_of_the_encoder_ends_a_stretch(start):
+    """Without a speed there the machine has no input; the rest is used, and a column without any number is none."""
+    recording, plate = start
+    speed = recording.speed_rad_per_s.copy()
+    gap = slice(speed.size // 2, speed.size // 2 + 300)
+    speed[gap] = np.nan
+    record = prepare([replace(recording, speed_rad_per_s=speed)], plate)
+    before, behind = record.windows
+    assert before.is_from_rest and not behind.is_from_rest
+    assert before.count + behind.count == prepare([recording], plate).windows[0].count - 300
+    assert all(np.isfinite(w.speed).all() for w in record.windows) and np.isfinite(record.sigma_w)
+    assert "300 samples have no speed" in record.remarks[-1]
+    assert not prepare([replace(recording, speed_rad_per_s=np.full(speed.size, np.nan))], plate).has_speed

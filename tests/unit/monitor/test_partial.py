@@ -9,8 +9,9 @@ import pytest
 
 from commissioner.errors import ConfigurationError
 from commissioner.monitor.intake.states.stretches import states
-from commissioner.operations.recordings.monitor import MonitorRequest, PartlyMonitored, monitor
+from commissioner.operations.recordings.monitor import MonitorRequest, NotMonitored, PartlyMonitored, monitor
 from commissioner.recordings.imported import store, understand
+from commissioner.recordings.importers import contract_table
 from commissioner.recordings.table import write_table
 from commissioner.records import RunningRecording
 
@@ -125,18 +126,59 @@ def test_the_band_stands_under_the_picture_of_an_import(tmp_path: Path) -> None:
     assert "what state the motor was in" in page
 
 
-def test_a_load_without_ripple_has_torque_and_speed_of_the_terminals(tmp_path: Path) -> None:
-    """Nothing modulates the current: the air-gap power is known all the same, and light load has no less iron loss."""
+def even(scale: float = 1.0) -> dict:
+    """A load that modulates nothing; currents that read `scale` times too large."""
     made = columns(volts=True)
     random = np.random.default_rng(7)
     for k, p in enumerate("uvw"):
         turn = np.exp(-1j * (0.85 + 2 * np.pi * k / 3))
         clean = (5.6 * np.exp(2j * np.pi * 50 * made["time_s"]) * turn).real
-        made[f"current_{p}_a"] = clean + 5e-3 * random.standard_normal(clean.size)
-    document = watched(tmp_path, made, PLATE).document
+        made[f"current_{p}_a"] = scale * (clean + 5e-3 * random.standard_normal(clean.size))
+    return made
+
+
+def test_a_load_without_ripple_has_torque_and_speed_of_the_terminals(tmp_path: Path) -> None:
+    """Nothing modulates the current: the air-gap power is known all the same, and light load has no less iron loss."""
+    document = watched(tmp_path, even(), PLATE).document
     power, copper = 1.5 * 326.6 * 5.6 * np.cos(0.85), 1.5 * 3.7 * 5.6**2
     torque, speed = document["mean_torque_nm"], document["mean_speed_rad_per_s"]
     assert torque["value"] == pytest.approx((power - copper) / (50 * np.pi), abs=torque["std"])
     assert torque["std"] > 0.02 * np.sqrt(3) * 400.0 * 4.86 / (50 * np.pi) > 0.1 * torque["std"]
     assert 0.0 < 50 * np.pi - speed["value"] < 2 * (50 * np.pi - 1436 * np.pi / 30)
     assert "neither the shaft" in document["withheld"]["periods"]
+
+
+@pytest.mark.parametrize("scale", [np.sqrt(3.0), 1.0 / np.sqrt(3.0), 2.0])
+def test_the_plate_is_asked_where_the_shaft_is_not_seen(tmp_path: Path, scale: float) -> None:
+    """By the power factor, which a scale of the currents leaves: what the terminals would tell is wrong by that scale."""
+    right = watched(tmp_path, even(), PLATE).document["mean_torque_nm"]
+    path = tmp_path / "scaled.csv"
+    write_table(path, even(scale), PLATE)
+    refused = monitor(MonitorRequest(path))
+    assert isinstance(refused, NotMonitored) and "do not belong to this plate" in refused.error.what
+    by_data = watched(tmp_path, even(scale), PLATE, trust="data").document
+    assert by_data["mean_torque_nm"]["value"] == pytest.approx(scale * right["value"], rel=0.2 * max(scale, 1.0))
+    assert "plate_contradiction" in {f["code"] for f in by_data["audit"]["findings"]}
+    by_plate = watched(tmp_path, even(scale), PLATE, trust="plate").document
+    assert by_plate["mean_torque_nm"]["value"] == pytest.approx(right["value"], rel=1e-3)
+    assert "currents_by_plate" in {f["code"] for f in by_plate["audit"]["findings"]}
+
+
+def test_the_plate_is_asked_of_a_short_stretch(tmp_path: Path) -> None:
+    table = contract_table(DATA / "off_start_step_off.csv.gz", None, None)
+    scaled = {k: v * (np.sqrt(3.0) if k.startswith("current") else 1.0) for k, v in table.columns.items()}
+    path = tmp_path / "scaled.csv"
+    write_table(path, scaled, table.metadata)
+    refused = monitor(MonitorRequest(path))
+    assert isinstance(refused, NotMonitored) and "do not belong to this plate" in refused.error.what
+    assert not any("mean_torque_nm" in state for state in refused.document["states"])
+
+
+def test_a_line_beyond_the_slip_that_the_power_allows_is_no_shaft(tmp_path: Path) -> None:
+    """A pulse pattern's half supply period, 2 in a thousand above synchronous speed: taken for the shaft, a motor became a generator."""
+    made = {name: values[:6000] for name, values in even().items()}
+    beyond = 1.0 + sum(0.02 * np.cos(2 * np.pi * h * 25.05 * made["time_s"]) for h in (1, 3, 5))
+    made |= {f"current_{p}_a": made[f"current_{p}_a"] * beyond for p in "uvw"}
+    document = watched(tmp_path, made, PLATE).document
+    assert document["mean_speed_rad_per_s"]["value"] < 50 * np.pi
+    assert document["mean_torque_nm"]["value"] > 5.0

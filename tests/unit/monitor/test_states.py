@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.chain import Wishes
+from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import cut_out, states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import from_nameplate
 from commissioner.operations.recordings.stretches import as_state, in_its_states
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
@@ -36,7 +38,9 @@ def test_off_start_step_and_coasting_are_told_with_their_times():
     assert seen[1].start_s == pytest.approx(0.2, abs=0.04) and 0.29 <= seen[1].end_s < 0.45
     assert seen[3].start_s <= 1.42 <= seen[3].end_s and seen[5].start_s == pytest.approx(2.3, abs=0.04)
     for stretch, torque, speed in ((seen[2], 5.0, 155.05), (seen[4], 13.0, 151.39)):
-        own = from_terminals(cut_out(recording, stretch, 0.06), plate, stretch.frequency_hz)
+        own = from_terminals(
+            inspect(cut_out(recording, stretch, 0.06), plate, from_nameplate(plate)).fundamental, plate
+        )
         assert own.torque_nm == pytest.approx(torque, abs=2.0 * own.torque_std_nm)
         assert own.speed_rad_per_s == pytest.approx(speed, abs=2.0 * own.speed_std_rad_per_s)
 
