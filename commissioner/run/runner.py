@@ -233,9 +233,10 @@ class Runner:
         self._stream = Stream(self._inverter, cursor, began_s, sensors, self._watch)
 
     def _explained(self, error: CommissionerError) -> CommissionerError:
-        facts, stats = self._progress.facts, self._inverter.port.stats
+        facts = self._progress.facts
         if not facts.energised:
             return error
+        stats = self._inverter.port.stats
         return with_link(
             with_host(error, stats.longest_gap_s, facts.watchdog_s), stats.latency_s(1.0), facts.watchdog_s
         )

@@ -44,7 +44,8 @@ def test_what_the_core_remarks_of_every_run_has_its_german():
         TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
         RESTORED_SINCE, ACCEPTED, "as before, read back", "no load current", "not identified",
         "Schneider Altivar ATV320, serial number not known",
-        "orientations: 2; sensor gain and anisotropy need at least three",
+        "orientations: 2; sensor gain and anisotropy need at least three: what the phases or their sensors differ by is in the values, and "
+        "not all of it in the intervals",
         "the tests reached 0.685 Wb; from there to 0.731 Wb, the level that L_M is told for, their own magnetizing curve leads; a "
         "quarter of the way is in L_M's standard error",
     )  # fmt: skip
