@@ -36,14 +36,14 @@ def in_its_states(
     if carrier is not None:
         recording = replace(recording, notes=(*recording.notes, ReadingNote(carrier.code, carrier.what)))
     stretches = states(recording, plate)
+    steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if {s.state for s in stretches} <= {"steady", "lost"}:
-        seen = _watched(recording, plate, wishes)
+        seen = (_watched if steady else observe)(recording, plate, wishes)
         out = [as_state(s, used=s.state == "steady") for s in stretches]
-        for state in out:
-            if state["state"] == "steady" and isinstance(seen, Refused):
+        for stretch, state in zip(stretches, out, strict=True):
+            if stretch in steady and isinstance(seen, Refused):
                 _add_own(state, seen, plate)
         return seen, recording, out
-    steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
         return (
             _not_watched(recording, _never_steady(stretches, plate)),

@@ -174,6 +174,18 @@ def test_the_plate_is_asked_of_a_short_stretch(tmp_path: Path) -> None:
     assert not any("mean_torque_nm" in state for state in refused.document["states"])
 
 
+def test_half_a_second_has_the_terminals_torque_and_a_tenth_has_none(tmp_path: Path) -> None:
+    made = even()
+    half = {name: values[made["time_s"] < 0.5] for name, values in made.items()}
+    told, long = watched(tmp_path, half, PLATE).document, watched(tmp_path, made, PLATE).document
+    assert told["mean_torque_nm"]["value"] == pytest.approx(long["mean_torque_nm"]["value"], rel=0.01)
+    write_table(
+        path := tmp_path / "tenth.csv", {name: values[made["time_s"] < 0.1] for name, values in made.items()}, PLATE
+    )
+    refused = monitor(MonitorRequest(path))
+    assert isinstance(refused, NotMonitored) and refused.document["refused_because"]["code"] == "too_short"
+
+
 def test_a_line_beyond_the_slip_that_the_power_allows_is_no_shaft(tmp_path: Path) -> None:
     """A pulse pattern's half supply period, 2 in a thousand above synchronous speed: taken for the shaft, a motor became a generator."""
     made = {name: values[:6000] for name, values in even().items()}

@@ -427,5 +427,5 @@ def test_the_true_values_are_those_behind_the_links_mean(shape, mean):
         if (made := draw(seed, effects=["dc_link_ripple"])).scenario.plant.effects[0].shape == shape
     )
     size, bare = drawn.scenario.plant.effects[0].size, draw(seed, effects=["none"])
-    seen, straight = (made.parameters_at(0.5) for made in (drawn, bare))
+    seen, straight = (made.parameters_at(0.5, (0.0,)) for made in (drawn, bare))
     assert [seen[name] * (1.0 + mean * size) / straight[name] for name in seen] == pytest.approx([1.0] * 4, abs=2e-5)

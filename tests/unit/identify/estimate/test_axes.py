@@ -64,7 +64,7 @@ def test_sensor_gain_and_heating_together_are_both_named_with_their_size():
 
 def test_too_few_orientations_are_said_to_be_too_few():
     for few in (axes()[:1], axes(orientations=(0.0, 60.0))):
-        assert any("at least three; what the phases or their sensors differ by" in r for r in combine(few).remarks)
+        assert any("at least three: what the phases or their sensors differ by" in r for r in combine(few).remarks)
     assert any("heating" in r for r in combine(axes(orientations=(0.0, 60.0, 120.0))).remarks)
 
 
