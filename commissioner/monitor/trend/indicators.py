@@ -19,7 +19,7 @@ from commissioner.monitor.periods.periods import PairSpectrum
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.running import TCircuit, stator_impedance
-from commissioner.records import Signal
+from commissioner.records import Signal, plain_name
 
 POINTS = 720
 SENSOR_NOISE = 0.15
@@ -61,8 +61,8 @@ def in_words(name: str) -> tuple[str, str]:
     """What it is and its unit: `load_torque_ripple_nm` as ("load torque ripple", "N m")."""
     for ending, unit in (("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%")):
         if name.endswith(ending):
-            return name.removesuffix(ending).replace("_", " "), unit
-    return name.replace("_", " "), ""
+            return plain_name(name.removesuffix(ending)), unit
+    return plain_name(name), ""
 
 
 def pulses(observation: Observation) -> Pulses | None:

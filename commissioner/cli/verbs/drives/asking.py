@@ -14,6 +14,7 @@ import typer
 
 from commissioner.errors import LinkError, UsageError
 from commissioner.link.drive.ordinary.probing import Known, Reading
+from commissioner.records import plain_name
 from commissioner.registers.contradictions import UNITS_OF_QUANTITY
 from commissioner.registers.convention import CIRCUITS, INDUCTANCES, RESISTANCES
 from commissioner.registers.status import STATUS_BITS
@@ -145,7 +146,7 @@ def _parameters(source: str, see: See) -> tuple[Parameter, ...]:
     asked = [
         seen
         for name in PARAMETERS
-        if sure(f"  {name.replace('_', ' ')}?") and (seen := _known(name, source, see, words, quantity_of(name)))
+        if sure(f"  {plain_name(name)}?") and (seen := _known(name, source, see, words, quantity_of(name)))
     ]
     if not asked:
         return ()
@@ -252,7 +253,7 @@ def quantity_of(name: str) -> Callable[[str], tuple[float, str]]:
         shown = parts[2].replace("Ω", "ohm") if parts else ""
         if parts is None or UNITS.get(shown.lower(), ("", 0.0))[0] not in UNITS_OF_QUANTITY[name]:
             raise typer.BadParameter(
-                f"{said!r} is no {name.replace('_', ' ')} with its unit: write it as 3.2 ohm, 13 mH, 140 ms or 2.1 %"
+                f"{said!r} is no {plain_name(name)} with its unit: write it as 3.2 ohm, 13 mH, 140 ms or 2.1 %"
             )
         return above_zero(parts[1]), shown
 

@@ -18,6 +18,7 @@ from commissioner.link.drive.ordinary.probing import Known, Reading
 from commissioner.link.files.drive_file import build
 from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.url import parse_url
+from commissioner.records import plain_name
 from commissioner.registers.profile import DriveProfile, Identity, LinkLimits
 from commissioner.registers.status import DriveState, decode_state
 
@@ -68,7 +69,7 @@ def _prove(port: ModbusPort, said: Answers, *, may_write: bool) -> Probed:
     for known in said.known:
         item, value = chosen[known.name].item, chosen[known.name].value
         screen.err.print(
-            f"  {known.name.replace('_', ' ')}: {value:g} {known.unit} = register {item.address} on the wire, {item.type} x {item.scale:g}"
+            f"  {plain_name(known.name)}: {value:g} {known.unit} = register {item.address} on the wire, {item.type} x {item.scale:g}"
         )
     first = next(iter(chosen.values())).item
     functions: tuple[int, ...] = ()
@@ -87,7 +88,7 @@ def _chosen(known: Known, found: list[Reading], shift: int, order: str) -> Readi
     narrow = probing.chosen(found, shift, order)
     wide = [r for r in found if r.shift == shift and r.item.words > narrow.item.words and r.item.word_order == order]
     if wide and typer.confirm(
-        f"{known.name.replace('_', ' ')} fits one register and two: does it take two in the manual?", err=True
+        f"{plain_name(known.name)} fits one register and two: does it take two in the manual?", err=True
     ):
         return wide[0]
     return narrow
