@@ -10,7 +10,6 @@ from pathlib import Path
 
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.procedure.assembly import assemble, columns
-from commissioner.recordings.table import check_ending, write_table
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_folder, find_run, must_be_archive, run_folders
 from commissioner.run.archive.documents import Loss, damaged, read_saved
@@ -64,6 +63,8 @@ def report_run(runs: Path, run: str) -> Reported:
 
 def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exported:
     """The run's whole samples as a recording in the contract's format. DataRefused: it has none, or they are damaged."""
+    from commissioner.recordings.table import check_ending, write_table
+
     summary = find_run(runs, run)
     check_ending(out)
     source = Path(summary.folder)

@@ -11,8 +11,7 @@ from commissioner.encoding import HIDDEN
 from commissioner.errors import CheckFailed, ErrorDocument
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import CheckResult, NotChecked, check_failed
-from commissioner.procedure.plan import ProcedurePlan
-from commissioner.procedure.steps import BELOW_TRIP, Job
+from commissioner.procedure.plan import BELOW_TRIP, Job, ProcedurePlan
 from commissioner.records import DriveIdentity
 from commissioner.run.inspection import WHICH, Inspection, inspect_drive
 from commissioner.settings import load_motor, load_procedure

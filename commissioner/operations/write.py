@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from commissioner.link.drive.facts import WriteReport
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.recordings.identify import Identified
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.report import mark_restored, mark_written
 from commissioner.run.archive.summary import RunSummary
-from commissioner.run.commission import Commissioned
 from commissioner.run.restore import Restored
 from commissioner.run.restore import restore as write_snapshot
 from commissioner.run.write_accepted import Plan, check_token, plan_restore, plan_write_back, write_accepted
-from commissioner.run.write_recorded import write_recorded as carry_out
 from commissioner.settings import load_procedure
+
+if TYPE_CHECKING:
+    from commissioner.operations.recordings.identify import Identified
+    from commissioner.run.commission import Commissioned
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,8 @@ def write_run(request: RunRequest, token: str) -> Written:
 
 def write_recorded(request: WriteRequest, identified: Identified, observe: Observe = nobody) -> Commissioned:
     """The verdict on a motor identified from recordings; an accepted one is written, as a run that `restore` takes."""
+    from commissioner.run.write_recorded import write_recorded as carry_out
+
     return carry_out(
         request.drive,
         request.profile,

@@ -8,8 +8,9 @@ from typing import Any
 from commissioner.procedure.energised.excite import excite
 from commissioner.procedure.energised.staircase import measure_resistance
 from commissioner.procedure.findings import RunEnded
+from commissioner.procedure.plan import Job
 from commissioner.procedure.states import State
-from commissioner.procedure.steps import Findings, Job, Step, check, connect, judge, through, write
+from commissioner.procedure.steps import Findings, Step, check, connect, judge, through, write
 from commissioner.safety.commands import Command
 
 __all__ = ["Findings", "Job", "course"]

@@ -7,8 +7,9 @@ from typing import Any
 
 from commissioner.procedure.checks import check_failed, judge_idle
 from commissioner.procedure.findings import ChecksJudged, RunEnded
+from commissioner.procedure.plan import Job
 from commissioner.procedure.states import Event, State
-from commissioner.procedure.steps import Findings, Job, Step, connect, through, told, write
+from commissioner.procedure.steps import Findings, Step, connect, through, told, write
 from commissioner.procedure.verdict import Decision, decide, evidence_of, match_of
 from commissioner.records import DriveStatus
 from commissioner.safety.commands import Command, ReadNameplate, ReadStatus, TakeSnapshot, Tell

@@ -16,10 +16,10 @@ from commissioner.identify.excite.tones import DesignedExcitation
 from commissioner.identify.inverter.first_current import FirstCurrent
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, prior, rated_flux
+from commissioner.motor.nameplate import prior
 from commissioner.motor.plate_match import PlateMatch
 from commissioner.procedure.assembly import assemble, highest_stator_flux_wb
-from commissioner.procedure.checks import CheckResult, DriveLimits, check_failed, judge_drive
+from commissioner.procedure.checks import CheckResult, check_failed, judge_drive
 from commissioner.procedure.findings import (
     ChecksJudged,
     DriveIdentified,
@@ -28,8 +28,8 @@ from commissioner.procedure.findings import (
     StateEntered,
     VerdictReached,
 )
-from commissioner.procedure.link_plan import LinkPlan, StreamPace, plan_link
-from commissioner.procedure.plan import ProcedurePlan
+from commissioner.procedure.link_plan import LinkPlan, plan_link
+from commissioner.procedure.plan import BELOW_TRIP, Job
 from commissioner.procedure.states import ENDED, ENERGISED, Event, State, follow
 from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of, match_of
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
@@ -48,79 +48,11 @@ from commissioner.safety.commands import (
 Step = Generator[Command, Any, Event]
 """What a state's generator is: yields commands, is sent replies, returns an event."""
 
-BELOW_TRIP = 0.85
-"""Of the drive's current limit: what tests aim at where that is less than they would take otherwise."""
-WINDOWS_A_WATCHDOG = 6.0
-"""Whole windows that a watchdog must outlast: one that is lost, its time-out, and one more; or, of requests that take as long, two readings
-of the status and a steering between two windows: at 150 ms a request these took 612 ms of a watchdog of 608 ms."""
 AT_WORST = 3.0
 """Standard errors of a look's L_M that a direct current reckons with, as the flux guard of the tones does: looks that knew L_M to 13 and
 17 % let a staircase reach 1.18 and 1.04 of the limit, and a closing bias 1.08."""
 DWELL_READINGS = 4
 """Status readings spread over the standstill dwell time."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """What the run was asked to do, and on what."""
-
-    plan: ProcedurePlan
-    nameplate: Nameplate
-    drive_limits: DriveLimits
-    parameter_names: dict[str, str]
-    """The drive's name of each written parameter -> the inverse-Gamma field it takes."""
-    write_back: bool
-    link_latency_s: float
-    parameter_factors: dict[str, float] = field(default_factory=dict)
-    """By what the drive multiplies a contract's SI value, where that is not 1: 2 for a line-to-line resistance."""
-    pace: StreamPace | None = None
-
-    @property
-    def scale_ramp_per_s(self) -> float:
-        return self.plan.excitation.scale_ramp_per_s
-
-    @property
-    def watchdog_s(self) -> float:
-        """The drive's: as planned, and longer, up to the longest allowed, where a few windows take longer."""
-        planned = self.plan.supervision
-        slow_s = WINDOWS_A_WATCHDOG * self.pace.round_trip_s if self.pace else 0.0
-        return max(planned.watchdog_s, min(slow_s, planned.max_watchdog_s))
-
-    @property
-    def test_current_a(self) -> float:
-        """The largest phase current that any test aims at, peak; less on a small drive (`Findings.test_current_a`)."""
-        return self.plan.limits.current_fraction * self.nameplate.rated_current_peak_a
-
-    @property
-    def trip_current_a(self) -> float:
-        return self.plan.limits.trip_fraction * self.nameplate.rated_current_peak_a
-
-    @property
-    def test_voltage_v(self) -> float:
-        """No test needs more along the axis: 30 % of the rated phase voltage's peak."""
-        return 0.3 * math.sqrt(2 / 3) * self.nameplate.rated_voltage_v
-
-    @property
-    def stretch(self) -> float:
-        """All test times hold for rotor time constants up to 0.5 s and are stretched in proportion beyond."""
-        return max(1.0, prior(self.nameplate).typical.rotor_time_constant_s / 0.5)
-
-    @property
-    def axis_time_s(self) -> float:
-        """Longest energised time of one session."""
-        return self.plan.limits.axis_time_s * self.stretch
-
-    @property
-    def total_time_s(self) -> float:
-        """Longest energised time of the run."""
-        return self.plan.limits.total_time_s * self.stretch
-
-    def flux_limit_wb(self, stator_resistance_ohm: float) -> float:
-        """The stator-flux peak at which the guard acts. No resistance that the plate does not allow moves it: 55 ohm of a 75 kW motor,
-        seen through a converter coarser than the current, had made it thirtyfold."""
-        box = prior(self.nameplate)
-        most_ohm = min(stator_resistance_ohm, box.upper.stator_resistance_ohm)
-        return self.plan.limits.flux_fraction * rated_flux(self.nameplate, most_ohm).stator_peak_wb
 
 
 @dataclass

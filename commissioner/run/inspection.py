@@ -15,8 +15,7 @@ from commissioner.link.wire.modbus import ModbusPort
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import RATED_VALUES, Nameplate
 from commissioner.procedure.checks import CheckResult, NotChecked, judge_drive, judge_idle
-from commissioner.procedure.plan import ProcedurePlan
-from commissioner.procedure.steps import Job
+from commissioner.procedure.plan import Job, ProcedurePlan
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.convention import parameter_limits
 from commissioner.registers.profile import DriveProfile

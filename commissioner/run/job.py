@@ -16,8 +16,7 @@ from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.link_plan import BITS_PER_REGISTER, OVERHEAD_BITS, StreamPace
-from commissioner.procedure.plan import ProcedurePlan
-from commissioner.procedure.steps import Job
+from commissioner.procedure.plan import Job, ProcedurePlan
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.safety.commands import ALL_CHANNELS

@@ -32,7 +32,7 @@ from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.procedure.energised.closing_bias import SECONDS as BIAS_S
 from commissioner.procedure.energised.multitone import KNOWN_LOG_STD
-from commissioner.procedure.steps import BELOW_TRIP
+from commissioner.procedure.plan import BELOW_TRIP
 from tests.support.standstill import saturating_block, usable_motors
 
 PERIOD_S = 2e-4

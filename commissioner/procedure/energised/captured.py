@@ -16,7 +16,8 @@ from commissioner.procedure.energised.ceilings import for_tones
 from commissioner.procedure.energised.multitone import UnderTest
 from commissioner.procedure.energised.session import OFFSET_S, load, next_block, tone_period_s
 from commissioner.procedure.findings import AxisFinished, StepProgress
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.records import DriveStatus
 from commissioner.safety.commands import Command, Disarm, Enable, ReadStatus, SetScale, Supervise, Tell
 

@@ -6,7 +6,8 @@ that trips at I keeps the flux whatever else is commanded or lost (`identify.exc
 
 from __future__ import annotations
 
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.safety.commands import SetDriveLimits
 
 SENSORS = 0.015

@@ -11,7 +11,8 @@ from commissioner.identify.excite.tones import Excitation, ExcitationLimits
 from commissioner.procedure.energised.multitone import UnderTest
 from commissioner.procedure.energised.session import SinceCommand, along_axis, next_block, tone_period_s
 from commissioner.procedure.findings import BiasChosen, GuardActed
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.safety.commands import Command, SetBias, SetScale, Tell
 
 SECONDS = 1.3

@@ -23,7 +23,8 @@ from commissioner.procedure.energised.session import (
     ramp_down,
     rest,
 )
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock, Signal, peak
 from commissioner.safety.commands import Command, Disarm, Enable, SetBias, SetDriveLimits
 

@@ -30,8 +30,9 @@ from commissioner.procedure.energised.session import (
     tone_period_s,
 )
 from commissioner.procedure.findings import ExcitationChosen, FirstLook, GuardActed
+from commissioner.procedure.plan import Job
 from commissioner.procedure.states import Event
-from commissioner.procedure.steps import Findings, Job, Step, reject
+from commissioner.procedure.steps import Findings, Step, reject
 from commissioner.procedure.verdict import Objection
 from commissioner.safety.commands import Command, Disarm, Enable, SetScale, Tell
 

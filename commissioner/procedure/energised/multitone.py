@@ -29,7 +29,8 @@ from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.energised.ceilings import aimed_current_a, tripping_current_a
 from commissioner.procedure.energised.session import along_axis, duration_s, tone_period_s
 from commissioner.procedure.findings import AxisFinished, EstimateUpdated
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock, peak
 from commissioner.safety.applied import judge_applied
 from commissioner.safety.watch import stop_if

@@ -12,7 +12,8 @@ import numpy as np
 from commissioner.errors import Aborted
 from commissioner.motor.nameplate import prior
 from commissioner.motor.space_vector import axis_current_a
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock, Signal
 from commissioner.safety.commands import Command, Fetch, LoadExcitation, Wait
 

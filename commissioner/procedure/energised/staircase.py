@@ -26,8 +26,9 @@ from commissioner.procedure.energised import ceilings
 from commissioner.procedure.energised.direct_current import STEER_S, DirectCurrent
 from commissioner.procedure.energised.session import BIAS_RAMP_PER_S, period_s
 from commissioner.procedure.findings import FirstCurrentSeen, StaircaseFitted, StepProgress
+from commissioner.procedure.plan import Job
 from commissioner.procedure.states import Event
-from commissioner.procedure.steps import Findings, Job, Step, reject
+from commissioner.procedure.steps import Findings, Step, reject
 from commissioner.procedure.verdict import Objection
 from commissioner.records import Signal
 from commissioner.safety.commands import Command, SetBias, SetDriveLimits, Tell

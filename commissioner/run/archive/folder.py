@@ -24,7 +24,6 @@ from typing import Any, BinaryIO
 from commissioner.encoding import plain
 from commissioner.errors import UsageError
 from commissioner.procedure.assembly import assemble, columns
-from commissioner.recordings.table import write_table
 from commissioner.recordings.whole import whole_file
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import append_frame, frame, read_blocks
@@ -139,6 +138,8 @@ class RunFolder:
 
 def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path | None:
     """`recording.parquet` from the blocks that are whole; None where no sample was taken."""
+    from commissioner.recordings.table import write_table
+
     recording = assemble(read_blocks(folder / "blocks.bin"), metadata, folder.name)
     if recording is None:
         return None

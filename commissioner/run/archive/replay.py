@@ -8,17 +8,16 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter
 
 from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.link.files.drive_file import archived_profile
-from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import RunEnded
+from commissioner.procedure.plan import Job
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
-from commissioner.report.run.summary import summarise
 from commissioner.run.acting import Announcer
 from commissioner.run.archive.blocks import BlockDamage, read_blocks
 from commissioner.run.archive.documents import damaged, read_saved
@@ -26,6 +25,9 @@ from commissioner.run.archive.journal import read_journal
 from commissioner.run.runner import JUDGED_REPLIES, kind_of
 from commissioner.safety import commands as ask
 from commissioner.settings import nameplate_of, plan_of
+
+if TYPE_CHECKING:  # with the estimators behind it: who only reads an archived set starts without them
+    from commissioner.procedure.course import Findings
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,9 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     A run that a guard, a fault or the operator ended is compared up to there; with `salvage` a damaged one up to the first
     loss. DataRefused: the folder holds no run.
     """
+    from commissioner.procedure.course import Findings
+    from commissioner.report.run.summary import summarise
+
     journal = read_journal(folder / "journal.jsonl")
     if not salvage:
         _check_whole(folder, journal)
@@ -134,6 +139,8 @@ def _end(record: Any) -> dict[str, Any]:
 
 def learn_again(folder: Path) -> tuple[Job, Findings]:
     """The job of a run, and all that it had learnt by its end, also where it was cut off. DataRefused as `replay`."""
+    from commissioner.procedure.course import Findings
+
     journal = read_journal(folder / "journal.jsonl")
     job, findings = read_job(folder, journal), Findings()
     for _ in _decide_again(job, findings, journal, folder):
@@ -177,6 +184,8 @@ def _decide_again(
     *,
     with_end: bool = False,
 ) -> Iterator[dict[str, Any]]:
+    from commissioner.procedure.course import course
+
     replies = iter([line["record"] for line in journal if line["kind"] == "reply"])
     blocks = _blocks_to_the_first_loss(folder / "blocks.bin")
     steps, reply = course(job, findings), None

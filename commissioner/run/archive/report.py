@@ -6,20 +6,20 @@ import hashlib
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from commissioner.encoding import plain
 from commissioner.errors import CommissionerError
 from commissioner.procedure.findings import RunEnded
-from commissioner.procedure.steps import Findings
 from commissioner.report.page import with_notice, with_notices_of
 from commissioner.report.run.contract import RunDocument
-from commissioner.report.run.page import run_page
-from commissioner.report.run.summary import summarise
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import learn_again
 from commissioner.run.archive.summary import RunSummary, read_file
-from commissioner.run.index.years import over_years
+
+if TYPE_CHECKING:
+    from commissioner.procedure.steps import Findings
 
 
 def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
@@ -51,6 +51,8 @@ def _mark(run: RunSummary, sentence: str) -> None:
 
 def make_report(run: RunSummary) -> None:
     """`report.html` of the run. DataRefused where it never reached its drive."""
+    from commissioner.report.run.summary import summarise
+
     path = Path(run.folder)
     job, findings = learn_again(path)
     ended = RunEnded(run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s)
@@ -61,6 +63,9 @@ def make_report(run: RunSummary) -> None:
 
 
 def _page(path: Path, result: RunDocument, findings: Findings, digest: str | None) -> str:
+    from commissioner.report.run.page import run_page
+    from commissioner.run.index.years import over_years
+
     journal, request, years = read_journal(path / "journal.jsonl"), read_file(path / "request.json"), None
     with suppress(CommissionerError, OSError):  # an archive that cannot be looked through spoils no report
         years = over_years(path)

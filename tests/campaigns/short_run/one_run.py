@@ -22,7 +22,8 @@ from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import rated_flux
 from commissioner.procedure.findings import RunEnded
-from commissioner.procedure.steps import Findings, Job
+from commissioner.procedure.plan import Job
+from commissioner.procedure.steps import Findings
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.summary import RunSummary, summarise
 from commissioner.run.job import bounds, drive_limits, names_of, watch_limits

@@ -18,9 +18,9 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.energised.excite import _test
 from commissioner.procedure.findings import RunEnded, StateEntered, VerdictReached
-from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
+from commissioner.procedure.plan import Acceptance, ExcitationPlan, Job, Limits, ProcedurePlan, Supervision
 from commissioner.procedure.states import Event, State
-from commissioner.procedure.steps import Findings, Job, check, connect
+from commissioner.procedure.steps import Findings, check, connect
 from commissioner.safety import commands as ask
 from commissioner.settings import load_motor
 

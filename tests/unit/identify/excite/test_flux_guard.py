@@ -13,7 +13,7 @@ from commissioner.identify.excite.tones import Excitation, Tone
 from commissioner.identify.inverter.staircase import knee_shape
 from commissioner.identify.observer.observer import BlockEstimate
 from commissioner.motor.circuit import InverseGamma
-from commissioner.procedure.steps import BELOW_TRIP
+from commissioner.procedure.plan import BELOW_TRIP
 from tests.campaigns.flux_guard import run_case
 from tests.support.standstill import saturating_block
 
