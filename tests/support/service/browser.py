@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,10 @@ from tests.support.service.service_process import ServiceProcess
 
 CHROMIUM = "/usr/bin/chromium"
 AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
+AXE_RULES = ("wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice")
+"""WCAG 2.2 A and AA, and axe's best practices."""
+CONTRAST = ("color-contrast", "link-in-text-block")
+"""What colours alone decide."""
 SIZES = {"1280": (1280, 800), "1024": (1024, 768), "390": (390, 844)}
 SLOW_MS = 240_000
 """A simulated drive beside other work on the host."""
@@ -154,14 +158,12 @@ class Technician:
         expect(self.page.locator(".verdict")).to_be_visible(timeout=timeout_ms)
 
     # --- judging ---------------------------------------------------------------------------------------------------
-    def violations(self) -> list[str]:
-        """What axe finds: WCAG 2.2 A and AA and its best practices; all folds opened."""
+    def violations(self, only: Sequence[str] = AXE_RULES) -> list[str]:
+        """What axe finds by these rules; all folds opened."""
         for fold in self.page.locator("details:not([open]) > summary").all():
             fold.click()
         self.page.evaluate(AXE.read_text("utf-8") + "\n;0")
-        found: dict[str, Any] = self.page.evaluate(
-            "() => axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] })"
-        )
+        found: dict[str, Any] = self.page.evaluate("only => axe.run(document, { runOnly: only })", list(only))
         return [
             json.dumps(
                 {

@@ -1,5 +1,10 @@
 """The running machine's kernel: its derivatives are exact, its currents are those of the closed form and of another's machine."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,6 +13,7 @@ from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
 
 SCALES = Scales(11.7, 326.6, 314.16, 26.0, 2)
 PERIOD = 2e-4
+ROOT = Path(__file__).resolve().parents[3]
 SPOKEN = {
     "stator_saturation_2": 0.1, "rotor_saturation_1": 0.05, "gap_saturation_2": 0.04, "leakage_softness": 0.2, "leakage_bend": 0.1, "bar_resistance": 0.3,
     "iron_conductance": 0.02, "stator_heat": 0.02, "rotor_heat": 0.03, "cage_asymmetry_re": 0.01, "cage_asymmetry_im": 0.02,
@@ -58,33 +64,40 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
         assert np.abs(differences - exact[k]).max() <= 2e-5 * max(np.abs(exact[k]).max(), 1.0), name
 
 
+LOAD = (np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 799))
+"""Four knots over 400 samples."""
+
+
+def complex_marches():
+    """(4, 400, 3): derivatives of the currents by each knot, from marches of complex numbers that are moved along it by 1e-30 i."""
+    count, (knots, places), whole = 400, LOAD, []
+    p, x = numbers(SPOKEN) + 0j, np.zeros(STATES, dtype=complex)
+    for direction in np.eye(4):
+        out, shaft = np.empty((count, 3), dtype=complex), np.empty((count, 2), dtype=complex)
+        moved = knots + 1e-30j * direction
+        march(p, SCALES.as_tuple(), x.copy(), *forcing(count), moved, places, PERIOD, True, out, shaft)
+        whole.append(out.imag / 1e-30)
+    return np.array(whole)
+
+
+@pytest.fixture(scope="module")
+def exact(tmp_path_factory):
+    """In a process that compiles nothing: compiled, complex numbers take 20 s."""
+    file = tmp_path_factory.mktemp("marches") / "complex.npy"
+    subprocess.run(
+        [sys.executable, "-m", __name__, str(file)], env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, check=True, cwd=ROOT
+    )
+    return np.load(file)
+
+
 @pytest.mark.parametrize("many", [4, 3])
-def test_derivatives_along_the_loads_knots_are_those_of_complex_marches(many):
-    """Four knots over 400 samples, everything else in the machine spoken for; asked for all of them or for the first three."""
-    count, p = 400, numbers(SPOKEN)
-    voltage, w = forcing(count)
-    knots, places = np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 2 * count - 1)
-    found = np.empty((many, count, 3))
-    load_tangents(p, SCALES.as_tuple(), np.zeros(STATES), voltage, w, knots, places, PERIOD, found)
-    for k in range(many):
-        run, shaft = np.empty((count, 3), dtype=complex), np.empty((count, 2), dtype=complex)
-        moved = knots + 1e-30j * np.eye(4)[k]
-        march.py_func(  # of complex numbers compiled in 20 s
-            p + 0j,
-            SCALES.as_tuple(),
-            np.zeros(STATES, dtype=complex),
-            voltage,
-            w,
-            moved,
-            places,
-            PERIOD,
-            True,
-            run,
-            shaft,
-        )
-        whole = run.imag / 1e-30
+def test_derivatives_along_the_loads_knots_are_those_of_complex_marches(exact, many):
+    """Everything else in the machine spoken for; asked for all of them or for the first three."""
+    found = np.empty((many, 400, 3))
+    load_tangents(numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), *forcing(400), *LOAD, PERIOD, found)
+    for one, whole in zip(found, exact, strict=False):
         assert np.abs(whole).max() > 0.0
-        assert np.abs(found[k] - whole).max() <= 1e-11 * np.abs(whole).max()
+        assert np.abs(one - whole).max() <= 1e-11 * np.abs(whole).max()
 
 
 def test_steady_current_is_that_of_the_circuit():
@@ -189,3 +202,7 @@ def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns()
     march(p, SCALES.as_tuple(), x, none, none, knots, np.zeros(t.size), PERIOD, True, out, shaft)
     swing = -0.03 * 26.0 / 0.1 / (2 * 150.0) * np.sin(2 * 150.0 * t[::2])
     assert (shaft[:, 0] - 300.0) / 2 == pytest.approx(swing, abs=0.02 * np.abs(swing).max())
+
+
+if __name__ == "__main__":
+    np.save(sys.argv[1], complex_marches())
