@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,11 @@ class Points:
     def count(self) -> int:
         return int(self.current_line_a.shape[0])
 
-    @property
+    @cached_property
     def omega(self) -> Array:
         return np.asarray(2.0 * np.pi * self.frequency_hz)
 
-    @property
+    @cached_property
     def phase_voltage_v(self) -> Array:
         return np.asarray(self.voltage_line_v / np.sqrt(3.0))
 

@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from commissioner.diagnose.intake.points import Array, Points
+from commissioner.diagnose.points.circuits import forward_differences
 from commissioner.diagnose.points.magnetizing import SPREAD, main_over_leakage
 
 FAST_HZ = (40.0, 1.0)
@@ -107,10 +108,13 @@ class _Fit:
             start += [SLOT_LOGIT[0], float(np.log(FAST_HZ[0]))]
 
         def errors(x: Array) -> Array:
-            left = (self.predicted(x) - z) / self.size
-            return np.concatenate([left.real, left.imag, self._prior(x)])
+            """`(k, 2 n + prior)` of k sets of numbers, `(k, numbers)`."""
+            left = (self.predicted(x.T[..., None]) - z) / self.size
+            return np.concatenate([left.real, left.imag, self._prior(x.T).T], axis=1)
 
-        found = least_squares(errors, start, x_scale="jac", max_nfev=200)
+        found = least_squares(
+            lambda x: errors(x[None])[0], start, lambda x: forward_differences(errors, x, np.inf), x_scale="jac", max_nfev=200,
+        )  # fmt: skip
         self.x, self.missed = found.x, found.fun[: 2 * z.size]
         self.jacobian, self.covariance = found.jac, np.linalg.pinv(found.jac.T @ found.jac)
         sign, size = np.linalg.slogdet(found.jac.T @ found.jac)
@@ -136,9 +140,10 @@ class _Fit:
             slot = 1.0 / (1.0 + np.exp(-x[4]))
             deep = (1.0 + 1.0j) * np.sqrt(frequency_hz / np.exp(np.clip(x[5], -20, 20)))
             return np.asarray(resistance * (1.0 - slot + slot * deep / np.tanh(deep)))
-        return np.full(frequency_hz.size, resistance + 0j)
+        return np.asarray(resistance + 0j * frequency_hz)
 
     def predicted(self, x: Array) -> Vector:
+        """`(n,)`; `(k, n)` of k sets of numbers, x of `(numbers, k, 1)`."""
         p = self.points
         current = p.current_line_a / np.median(p.current_line_a)
         leak = 1j * p.omega * np.exp(x[1]) / np.maximum(1.0 + x[3] * (current - 1.0), 0.1)

@@ -24,6 +24,8 @@ ROUNDS = 9
 """Fixed-point rounds from the measured current; each takes off nine tenths of the error and more."""
 
 
+HALF_OF_THE_DIGITS = float(np.sqrt(np.finfo(float).eps))
+"""The step of a forward difference, over the larger of a number and 1."""
 FARTHEST = 50.0
 """From its start, of the logarithm of a resistance (or loss) or inductance: a trial step beyond overflows."""
 
@@ -70,7 +72,7 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
 def _predicted(
     x: Array, points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]
 ) -> tuple[Array, Array]:
-    """Current (A rms) and power (W) at the points' voltage and frequency."""
+    """Current (A rms) and power (W) at the points' voltage and frequency, `(n,)`; `(k, n)` of k sets of numbers, x of `(numbers, k, 1)`."""
     acting: dict[str, tuple[Extension, Array]] = {}
     at = own_numbers(points)
     for extension in extensions:
@@ -161,20 +163,32 @@ def fit_points(
     start = start if near is None else near
 
     def errors(x: Array) -> Array:
-        current, power = _predicted(x, points, extensions, scale)
+        """`(k, 2 n + prior)` of k sets of numbers, `(k, numbers)`."""
+        current, power = _predicted(x.T[..., None], points, extensions, scale)
         return np.concatenate(
             [
                 (current / points.current_line_a - 1.0) / scale["current_scatter"],
                 (power / points.power_w - 1.0) / scale["power_scatter"],
-                (x[2 : 2 + usual.size] - usual) / SPREAD,
-            ]
+                (x[:, 2 : 2 + usual.size] - usual) / SPREAD,
+            ],
+            axis=1,
         )
 
-    solution = least_squares(errors, start, bounds=(low, high), x_scale="jac", max_nfev=100)
+    solution = least_squares(
+        lambda x: errors(x[None])[0], start, lambda x: forward_differences(errors, x, high), bounds=(low, high), x_scale="jac", max_nfev=100,
+    )  # fmt: skip
     freedom = max(solution.fun.size - start.shape[0], 1)
     variance = max(float(solution.fun @ solution.fun) / freedom, LEAST_VARIANCE)
     covariance = variance * np.linalg.pinv(solution.jac.T @ solution.jac)
     return solution.x, covariance, solution.fun
+
+
+def forward_differences(errors: Callable[[Array], Array], x: Array, high: Array | float) -> Array:
+    """Jacobian `(m, numbers)` of errors `(k, m)` that are asked for k sets of numbers at once; no step passes `high`."""
+    steps = HALF_OF_THE_DIGITS * np.maximum(np.abs(x), 1.0)
+    moved = x + np.diag(np.where(x + steps > high, -steps, steps))
+    at, *others = errors(np.vstack([x, moved]))
+    return np.asarray((np.array(others) - at).T / (np.diag(moved) - x))
 
 
 def held_out(points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]) -> Array:
