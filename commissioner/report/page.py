@@ -16,8 +16,12 @@ if TYPE_CHECKING:
 Tone = Literal["good", "warn", "bad", "plain"]
 
 INK, MUTED, RULE = "#1b2330", "#667085", "#d8dde5"
-BLUE, ORANGE, GREEN, RED, PURPLE = "#1f5fa8", "#c8641b", "#2c7a4b", "#b3261e", "#6b4fa0"
+BLUE, ORANGE, GREEN, RED, PURPLE = "#194c87", "#e27627", "#318954", "#bb281f", "#3c2c5a"
 """The figures' colours, apart in hue and in lightness (they survive grey printing and red-green blindness)."""
+STROKES: dict[str, Any] = {
+    BLUE: "-", ORANGE: "--", GREEN: "-.", PURPLE: ":", RED: (0, (6, 1, 1, 1, 1, 1)), INK: (0, (8, 2)),
+}  # fmt: skip
+"""The line of each colour, where smooth curves share a panel."""
 
 PLOT_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -43,6 +47,11 @@ PLOT_STYLE: dict[Any, Any] = {
     "svg.hashsalt": "commissioner",
     "figure.constrained_layout.use": True,
 }
+
+
+def told_apart(colour: str) -> dict[str, Any]:
+    """Colour and stroke of one curve among several: a print in black and white has the stroke."""
+    return {"color": colour, "linestyle": STROKES[colour]}
 
 
 @dataclass(frozen=True)
