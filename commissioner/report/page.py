@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from jinja2 import Environment
 from markupsafe import Markup, escape
@@ -49,7 +49,14 @@ PLOT_STYLE: dict[Any, Any] = {
 }
 
 
-def told_apart(colour: str) -> dict[str, Any]:
+class Stroke(TypedDict):
+    """As matplotlib calls them."""
+
+    color: str
+    linestyle: Any
+
+
+def told_apart(colour: str) -> Stroke:
     """Colour and stroke of one curve among several: a print in black and white has the stroke."""
     return {"color": colour, "linestyle": STROKES[colour]}
 
