@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from jinja2 import Environment
 from markupsafe import Markup, escape
@@ -16,8 +16,12 @@ if TYPE_CHECKING:
 Tone = Literal["good", "warn", "bad", "plain"]
 
 INK, MUTED, RULE = "#1b2330", "#667085", "#d8dde5"
-BLUE, ORANGE, GREEN, RED, PURPLE = "#1f5fa8", "#c8641b", "#2c7a4b", "#b3261e", "#6b4fa0"
+BLUE, ORANGE, GREEN, RED, PURPLE = "#194c87", "#e27627", "#318954", "#bb281f", "#3c2c5a"
 """The figures' colours, apart in hue and in lightness (they survive grey printing and red-green blindness)."""
+STROKES: dict[str, Any] = {
+    BLUE: "-", ORANGE: "--", GREEN: "-.", PURPLE: ":", RED: (0, (6, 1, 1, 1, 1, 1)), INK: (0, (8, 2)),
+}  # fmt: skip
+"""The line of each colour, where smooth curves share a panel."""
 
 PLOT_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -43,6 +47,18 @@ PLOT_STYLE: dict[Any, Any] = {
     "svg.hashsalt": "commissioner",
     "figure.constrained_layout.use": True,
 }
+
+
+class Stroke(TypedDict):
+    """As matplotlib calls them."""
+
+    color: str
+    linestyle: Any
+
+
+def told_apart(colour: str) -> Stroke:
+    """Colour and stroke of one curve among several: a print in black and white has the stroke."""
+    return {"color": colour, "linestyle": STROKES[colour]}
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
 from commissioner.report.sheet.drawing import Panel, Range, padded
 from commissioner.report.sheet.numbers import digits, half_width, with_interval
+from commissioner.report.sheet.words import spoken
 from commissioner.study.rows import Row
 from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, relative_errors
 
@@ -32,9 +33,10 @@ def page(rows: Sequence[Row], seen: Summary, title: str) -> str:
         parts.append(_flux(rows))
     if any("file" in row for row in rows):
         parts.append(_by_file(rows))
-    if seen.reasons:
-        reasons = [(reason, str(number)) for reason, number in seen.reasons.items()]
-        parts.append(marks.table((marks.Column("Not accepted because"), marks.Column("Cases", right=True)), reasons))
+    for head, sentences in (("Not accepted because", seen.reasons), ("Remarks", seen.remarks)):
+        if sentences:
+            counts = [(spoken(sentence), str(number)) for sentence, number in sentences.items()]
+            parts.append(marks.table((marks.Column(head), marks.Column("Cases", right=True)), counts))
     if any(group.errors for group in seen.effects):
         parts.append(_by_effect(seen.effects))
     margins = Margins("Study", "", title, "", f"{seen.cases} cases, {seen.cpu_s:.0f} CPU-s")

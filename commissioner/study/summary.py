@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+import re
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +21,8 @@ ANSWERED = frozenset(
 )
 """Outcomes of a case that came to what its kind asks for."""
 QUANTILES = (0.5, 0.95, 1.0)
-MOST_REASONS = 20
+MOST_SENTENCES = 20
+_NUMBER = re.compile(r"(?<![\w.,])[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?")
 SIZES_KW = (1.0, 10.0)
 """Ends of the classes of rated power that errors are told for."""
 
@@ -51,12 +53,13 @@ class Group:
 
 @dataclass(frozen=True)
 class Summary:
-    """`reasons`: how often each reason ended a case without an answer; `sizes`: by rated power; `effects`: a case with
-    several counts for each of them."""
+    """`reasons`: how many cases each reason ended without an answer; `remarks`: how many have each remark; `sizes`: by rated power;
+    `effects`: a case with several counts for each of them."""
 
     cases: int
     outcomes: Mapping[str, int]
     reasons: Mapping[str, int]
+    remarks: Mapping[str, int]
     errors: tuple[Errors, ...]
     sizes: tuple[Group, ...]
     effects: tuple[Group, ...]
@@ -66,13 +69,33 @@ class Summary:
 
 def summarise(rows: Sequence[Row]) -> Summary:
     """Over all rows; parameters over those that were commissioned."""
-    reasons = Counter(f"{row['outcome']}: {row['reason']}" for row in rows if row["outcome"] not in ANSWERED)
+    reasons = counted([f"{row['outcome']}: {row['reason']}"] for row in rows if row["outcome"] not in ANSWERED)
+    remarks = counted((row.get("remarks") or "").splitlines() for row in rows)
     flux = [fraction for row in rows if (fraction := row.get("peak_flux_fraction")) is not None]
     whole = _group("all", rows)
     return Summary(
-        whole.cases, whole.outcomes, dict(reasons.most_common(MOST_REASONS)), whole.errors, tuple(_sizes(rows)), tuple(_effects(rows)),
+        whole.cases, whole.outcomes, reasons, remarks, whole.errors, tuple(_sizes(rows)), tuple(_effects(rows)),
         max(flux, default=None), math.fsum(row.get("cpu_s") or 0.0 for row in rows),
     )  # fmt: skip
+
+
+def counted(cases: Iterable[Iterable[str]]) -> dict[str, int]:
+    """In how many cases each sentence stands, the most frequent first. Those that differ in numbers only are one: `…` for such a number."""
+    holders: defaultdict[str, set[int]] = defaultdict(set)
+    numbers: defaultdict[str, list[list[str]]] = defaultdict(list)
+    for case, sentences in enumerate(cases):
+        for sentence in sentences:
+            frame = _NUMBER.sub("\0", sentence)
+            holders[frame].add(case)
+            numbers[frame].append(_NUMBER.findall(sentence))
+    most = sorted(holders, key=lambda frame: -len(holders[frame]))[:MOST_SENTENCES]
+    return {_filled(frame, numbers[frame]): len(holders[frame]) for frame in most}
+
+
+def _filled(frame: str, numbers: Sequence[Sequence[str]]) -> str:
+    first, *rest = frame.split("\0")
+    same = (values[0] if len(set(values)) == 1 else "…" for values in zip(*numbers, strict=True))
+    return first + "".join(number + part for number, part in zip(same, rest, strict=True))
 
 
 def accepted(rows: Iterable[Row], name: str) -> list[Row]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from inspect import Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -34,30 +35,6 @@ runs_app = typer.Typer(
 )
 
 
-@runs_app.command("list")
-def runs_list(
-    motor: WhichMotor = "",
-    drive: WhichDrive = "",
-    serial: WhichSerial = "",
-    person: WhichPerson = "",
-    outcome: WhichOutcome = "",
-    since: Since = "",
-    until: Until = "",
-    limit: Limit = None,
-    out: TableOut = None,
-    archive: Database = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.verbs.archived.runs import find
-    from commissioner.operations.history.runs import Archive, Wanted
-
-    wanted = Wanted(motor, drive, serial, person, outcome, since, until)
-    find(Archive(runs, archive), wanted, limit, out, as_json=json)
-
-
-@runs_app.command("find")
 def runs_find(
     text: Annotated[
         list[str], typer.Argument(help="Words, each anywhere in run, motor, drive, person, outcome or reason.")
@@ -81,6 +58,17 @@ def runs_find(
 
     wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text))
     find(Archive(runs, archive), wanted, limit, out, as_json=json)
+
+
+def runs_list(**options: Any) -> None:
+    """Every run in the archive, newest first, also those that were cut off."""
+    runs_find([], **options)
+
+
+_words, *_options = signature(runs_find, eval_str=True).parameters.values()
+vars(runs_list)["__signature__"] = Signature(_options)
+runs_app.command("list")(runs_list)
+runs_app.command("find")(runs_find)
 
 
 @runs_app.command("index")

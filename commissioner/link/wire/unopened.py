@@ -10,8 +10,10 @@ from pathlib import Path
 from commissioner.errors import LinkUnreachable
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 
-NOT_OURS = frozenset({errno.EACCES, errno.EPERM, errno.EBUSY, errno.EAGAIN})
-"""The port is there and this user may not open it, or another program holds it."""
+NOT_OURS = frozenset({errno.EACCES, errno.EPERM})
+"""The port is there and this user may not open it."""
+HELD = frozenset({errno.EBUSY, errno.EAGAIN})
+"""It is there, and another program has it for itself."""
 NO_ROUTE = frozenset({errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN})
 NO_SERIAL_PORT = frozenset({errno.ENOTTY, errno.ENODEV, errno.EISDIR})
 HANDSHAKE = "handshake operation timed out"
@@ -66,6 +68,11 @@ def _of_serial(url: RtuUrl, error: Exception) -> tuple[str, str]:
         return (
             f"there is no serial port {url.path}",
             "plug the adapter in; `commissioner ports` lists the serial ports of this computer",
+        )
+    if number in HELD:
+        return (
+            f"another program holds {url.path}",
+            "close the other program, or wait for its end: one alone speaks on a serial line, whichever of its drives it speaks to",
         )
     if number in NOT_OURS or number is None:  # Windows gives no number and refuses a port that is held
         return (

@@ -29,6 +29,7 @@ from commissioner.operations.history.share import (
     file_names,
 )
 from commissioner.run.archive.catalogue import find_folder, run_folders
+from commissioner.run.archive.journal import whole_lines
 from commissioner.run.archive.verify import DAMAGED, verify
 from commissioner.run.index.index import JOURNAL
 from commissioner.text import split_address
@@ -62,7 +63,7 @@ def _one(folder: Path, service: _Service) -> Moved:
     seen, run = verify(folder), folder.name
     if seen.state == DAMAGED:
         return Moved(run, LEFT, 0, 0, f"{seen.losses[0].file}: {seen.losses[0].what}")
-    journal, path = (folder / JOURNAL).read_bytes(), f"/api/incoming/{quote(run)}"
+    journal, path = whole_lines(folder / JOURNAL), f"/api/incoming/{quote(run)}"
     there = service.ask("GET", f"{path}?journal_bytes={len(journal)}")
     relation = _relation(journal, there["journal"])
     if relation == CONFLICT:
@@ -71,7 +72,8 @@ def _one(folder: Path, service: _Service) -> Moved:
         return Moved(run, relation, 0, 0)
     files, size, names = 0, 0, file_names(folder)
     for name in names:
-        if sent := _send(folder / name, f"{path}/{quote(name)}", there["begun"].get(name), service):
+        content = journal if name == JOURNAL else (folder / name).read_bytes()
+        if sent := _send(content, f"{path}/{quote(name)}", there["begun"].get(name), service):
             files, size = files + 1, size + sent
     done = service.ask("POST", path, json.dumps({"files": names}).encode(), "application/json")
     return Moved(run, str(done["what"]), files, size, str(done["why"]))
@@ -89,9 +91,8 @@ def _relation(journal: bytes, there: Mapping[str, Any] | None) -> str:
     return UPDATED if count < len(journal) else NEWER
 
 
-def _send(file: Path, path: str, begun: Mapping[str, Any] | None, service: _Service) -> int:
+def _send(content: bytes, path: str, begun: Mapping[str, Any] | None, service: _Service) -> int:
     """Bytes sent: the rest of what was begun, everything where that is not ours."""
-    content = file.read_bytes()
     held = int(begun["bytes"]) if begun else -1
     if begun is None or held > len(content) or hashlib.sha256(content[:held]).hexdigest() != begun["sha256"]:
         held = -1

@@ -14,6 +14,7 @@ from typing import BinaryIO
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.run.archive.catalogue import find_folder, run_folders
 from commissioner.run.archive.documents import open_no_link
+from commissioner.run.archive.journal import drop_torn_line, whole_lines
 from commissioner.run.archive.seal import cover
 from commissioner.run.archive.verify import DAMAGED, verify
 from commissioner.run.index.index import JOURNAL, note
@@ -98,11 +99,12 @@ def _one(folder: Path, target: Path) -> Moved:
         return Moved(folder.name, relation, 0, 0)
     incoming = target / INCOMING / folder.name
     files, size = _copy(folder, incoming)
+    drop_torn_line(incoming / JOURNAL)
     arrived = verify(incoming)
-    if arrived.state == DAMAGED or arrived.records != len((incoming / JOURNAL).read_bytes().splitlines()):
+    if arrived.state == DAMAGED:
         shutil.rmtree(incoming, ignore_errors=True)
-        why = arrived.losses[0].what if arrived.losses else "its last line is torn"
-        return Moved(folder.name, LEFT, 0, 0, f"it was written to, or the copy is not what was read ({why}); try again")
+        why = f"it was written to, or the copy is not what was read ({arrived.losses[0].what}); try again"
+        return Moved(folder.name, LEFT, 0, 0, why)
     _put_in_place(incoming, there)
     note(there)
     return Moved(folder.name, relation, files, size)
@@ -110,7 +112,7 @@ def _one(folder: Path, target: Path) -> Moved:
 
 def _relation(folder: Path, there: Path) -> str:
     """By the chains: one journal that begins with the other is its later state."""
-    ours, theirs = (folder / JOURNAL).read_bytes(), (there / JOURNAL).read_bytes()
+    ours, theirs = whole_lines(folder / JOURNAL), whole_lines(there / JOURNAL)
     if ours == theirs:
         return THERE
     if ours.startswith(theirs):

@@ -13,7 +13,7 @@ from commissioner.monitor.trend.indicators import Indicator, Pulses, in_words
 from commissioner.monitor.trend.trend import History, Verdict
 from commissioner.motor.circuit import QUANTILE
 from commissioner.records import RPM, Signal
-from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, RULE, figure_of
+from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, RULE, figure_of, told_apart
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def over_angle(seen: Observation) -> Figure:
     ):
         if value is not None and std is not None:
             x, y, s = _thin(turns, value, std)
-            torque.plot(x, y, color=colour, label=name)
+            torque.plot(x, y, **told_apart(colour), label=name)
             torque.fill_between(x, y - QUANTILE * s, y + QUANTILE * s, color=colour, alpha=0.2, linewidth=0)
     torque.set_ylabel("torque / N m")
     torque.set_xlabel("shaft turns from the first sample of the period")
@@ -96,8 +96,8 @@ def resimulation(seen: Observation) -> Figure:
     time = (proof.time_s[:length] - proof.time_s[0]) * 1e3
     for panel, part, name in ((panels[0, 0], np.real, "i_d / A"), (panels[0, 1], np.imag, "i_q / A")):
         x, measured, simulated = _thin(time, part(proof.measured_a[:length]), part(proof.simulated_a[:length]))
-        panel.plot(x, measured, color=MUTED, linewidth=0.8, label="measured")
-        panel.plot(x, simulated, color=ORANGE, linewidth=0.9, label="simulated")
+        panel.plot(x, measured, color=MUTED, linewidth=2.2, label="measured")
+        panel.plot(x, simulated, color=BLUE, linewidth=0.9, label="simulated")
         panel.set_ylabel(name)
         panel.set_xlabel("time / ms")
         panel.margins(y=0.22)
@@ -124,7 +124,11 @@ def spectrum(seen: Observation) -> Figure:
             height = float(found.spectrum.at(h * load.frequency_hz, 0.4)[0])
             if h == 1 or height > VISIBLE:
                 top.axvline(
-                    h * load.frequency_hz, color=colour, alpha=0.45, linewidth=1.0, label=named if h == 1 else None
+                    h * load.frequency_hz,
+                    **told_apart(colour),
+                    alpha=0.45,
+                    linewidth=1.0,
+                    label=named if h == 1 else None,
                 )
                 top.annotate(
                     f"{h}×",
@@ -156,7 +160,9 @@ def superimposed(pulses: Pulses) -> Figure:
     figure, panels = _panels(1, 1, 3.4)
     panel = panels[0, 0]
     for k, curve in enumerate(pulses.curves):
-        panel.plot(np.linspace(0, 1, curve.size), curve, color=COLOURS[k % len(COLOURS)], label=f"pulse {k + 1}")
+        panel.plot(
+            np.linspace(0, 1, curve.size), curve, **told_apart(COLOURS[k % len(COLOURS)]), label=f"pulse {k + 1}"
+        )
     panel.set_xlabel(f"part of the pulse (1/{pulses.per_turn} turn)")
     panel.set_ylabel("torque / height of the mean pulse")
     panel.legend(frameon=False)
@@ -170,7 +176,10 @@ def trend(history: History, indicators: Sequence[Indicator], verdict: Verdict | 
     figure, panels = _panels((len(names) + 1) // 2, 2, 1.9 * ((len(names) + 1) // 2))
     for panel, name in zip(panels.flat, names, strict=False):
         count = 0
-        for entries, colour, label in ((history.healthy, GREEN, "healthy"), (history.judged, ORANGE, "judged")):
+        for entries, colour, label, marker in (
+            (history.healthy, GREEN, "healthy", "o"),
+            (history.judged, ORANGE, "judged", "D"),
+        ):
             values = [entry.indicators[name] for entry in entries if name in entry.indicators]
             x = np.arange(count, count + len(values))
             count += len(values)
@@ -179,7 +188,7 @@ def trend(history: History, indicators: Sequence[Indicator], verdict: Verdict | 
                     x,
                     [v for v, _ in values],
                     yerr=[QUANTILE * s for _, s in values],
-                    fmt="o",
+                    fmt=marker,
                     markersize=3,
                     color=colour,
                     label=label,

@@ -141,14 +141,16 @@ def _on_axis(record: Record) -> str:
 
 def registers_and_record(subject: Subject) -> Markup:
     """Appendix B."""
-    parts = [Markup("<h2>B. Registers, record, procedure, circuit</h2>")]
+    files = subject.first("folder_closed").get("files") or {}
+    here = [*["registers"] * bool(subject.written), *["record"] * bool(files), "procedure", "circuit"]
+    parts = [Markup("<h2>B. {}</h2>").format(marks.capitalised(", ".join(here)))]
     if subject.written:
         columns = (
             Column("Register"), Column("Parameter"), Column("Old", right=True), Column("Written", right=True),
             Column("Read back", right=True), Column("Unit"), Column("Compared"),
         )  # fmt: skip
         parts.append(marks.table(columns, _registers(subject)))
-    if files := (subject.first("folder_closed").get("files") or {}):
+    if files:
         digests = [
             (name, Markup('<span class="hash">{}</span>').format(facts["sha256"]))
             for name, facts in sorted(files.items())
@@ -226,11 +228,13 @@ def _circuit(subject: Subject) -> Markup:
 
 
 def uncertainty(subject: Subject) -> Markup:
-    """Appendix C."""
-    terms = Markup("").join(
-        Markup("<div><dt>{}</dt> <dd>{}</dd></div>").format(name, typeset(words)) for name, words in _TERMS
-    )
-    parts = [Markup("<h2>C. Uncertainty</h2>"), Markup('<dl class="termlist flow">{}</dl>').format(terms)]
+    """Appendix C; empty where there is nothing that could be uncertain, and nothing was remarked."""
+    parts = []
+    if subject.parameters:
+        terms = Markup("").join(
+            Markup("<div><dt>{}</dt> <dd>{}</dd></div>").format(name, typeset(words)) for name, words in _TERMS
+        )
+        parts.append(Markup('<dl class="termlist flow">{}</dl>').format(terms))
     if subject.tests and subject.parameters:
         columns = (
             Column("Test"),
@@ -243,7 +247,7 @@ def uncertainty(subject: Subject) -> Markup:
     if remarks:
         lines = Markup("").join(Markup("<li>{}</li>").format(spoken(f"{marks.capitalised(r)}.")) for r in remarks)
         parts.append(Markup('<h3>Remarks of the estimator</h3><ul class="lines">{}</ul>').format(lines))
-    return Markup("\n").join(parts)
+    return Markup("\n").join([Markup("<h2>C. Uncertainty</h2>"), *parts]) if parts else Markup("")
 
 
 def _test(axis: Record) -> tuple[Text, ...]:

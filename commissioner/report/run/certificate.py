@@ -167,7 +167,7 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
         f"limit {digits(limit, 3)} Wb" if limit else "",
     )  # fmt: skip
     total = f"{subject.samples:,}".replace(",", " ")
-    yield "Samples lost", str(subject.gaps.lost_samples) if subject.gaps else "not known", f"of {total}"
+    yield "Samples lost", str(subject.lost_samples), f"of {total}" if subject.samples else "none taken"
 
 
 def _how_far(subject: Subject) -> str:
@@ -397,7 +397,7 @@ def _unchecked(subject: Subject) -> Iterator[Text]:
             yield Markup("{} above {} Wb ({} % of rated flux)").format(
                 marks.L_M, digits(top, 3), f"{100 * top / rated:.0f}"
             )
-    done, planned = len(subject.tests), len(subject.planned_deg)
+    done, planned = subject.tests_done, len(subject.planned_deg)
     if planned > done:
         yield f"{counted(planned - done, 'test')} of {planned}: the run ended before"
     yield "anything that turns: iron loss at speed, phase order, encoder"

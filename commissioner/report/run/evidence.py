@@ -312,7 +312,7 @@ def leg_loss(subject: Subject) -> Markup:
         shown = with_interval(loss["value"], half_width(loss["std"]))
         panel.text(211, panel.at_y(loss["value"]) - 4, f"{shown} V, large currents", "k halo", "end")
     panel.text(211, panel.at_y(0.72 * top), "lost in one leg, V", "t halo", "end")
-    if knee := inverter.get("knee_a"):
+    if (knee := inverter.get("knee_a")) and knee < reach:
         panel.point(knee, float(np.interp(knee, current, voltage)), "open")
         panel.named(
             knee + 0.03 * reach, float(np.interp(knee, current, voltage)) - 0.06 * top, f"knee {digits(knee, 2)} A"
@@ -328,13 +328,15 @@ def iron(subject: Subject) -> Markup:
     flux = np.array([point["stator_flux_wb"] for point in curve])
     value = 1e3 * np.array([point["magnetizing_inductance_h"]["value"] for point in curve])
     half = half_width(1.0, 1e3) * np.array([point["magnetizing_inductance_h"]["std"] or 0.0 for point in curve])
+    held = subject.result["holds_for_stator_flux_wb"]
+    at = 1e3 * subject.parameters["magnetizing_inductance_h"]["value"]
     rated, limit = subject.result["rated_flux_wb"]["stator_peak"], subject.guard.get("limit_wb")
     span = (0.0, 1.04 * max(float(flux[-1]), rated, limit or 0.0))
     panel = Panel(
         217,
         138,
         span,
-        padded([*(value - half), *(value + half)], 0.15),
+        padded([*(value - half), *(value + half), at], 0.2),
         "Magnetizing inductance over stator flux",
         left=28,
     )
@@ -344,8 +346,6 @@ def iron(subject: Subject) -> Markup:
     if limit:
         panel.upright(limit).text(panel.at_x(limit) - 3, 60, f"limit {digits(limit, 3)}", "l halo", turn=True)
     panel.upright(rated, "ax").text(panel.at_x(rated) - 3, 60, f"rated {digits(rated, 3)}", "halo", turn=True)
-    held = subject.result["holds_for_stator_flux_wb"]
-    at = 1e3 * subject.parameters["magnetizing_inductance_h"]["value"]
     panel.point(held, at, radius=3.2)
     panel.text(
         panel.at_x(held) - 6, panel.at_y(at) + 12, f"{digits(at, 4)} mH at {digits(held, 3)} Wb", "k halo", "end"

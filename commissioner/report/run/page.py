@@ -35,7 +35,7 @@ def run_page(
         Page("evidence", "Evidence", evidence(subject)),
         Page("simulation", "Plain simulation", plain_simulation(subject)),
         Page("a", "A Checks", checks_and_course(subject), is_appendix=True),
-        Page("b", "B Registers", registers_and_record(subject), is_appendix=True),
+        Page("b", "B Procedure", registers_and_record(subject), is_appendix=True),
         Page("c", "C Uncertainty", uncertainty(subject), is_appendix=True),
         Page("d", "D The motor over the years", years_sheet(years), is_appendix=True),
     ]

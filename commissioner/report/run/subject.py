@@ -205,6 +205,16 @@ class Subject:
     def samples(self) -> int:
         return sum(block.count for _, block in self.findings.blocks)
 
+    @property
+    def lost_samples(self) -> int:
+        """Of the stream, whether or not a result was made of it."""
+        return sum(block.lost_before for _, block in self.findings.blocks)
+
+    @property
+    def tests_done(self) -> int:
+        """Tests that came to their end, whether or not a result was made of them."""
+        return sum(line["kind"] == "axis_finished" and not line["record"]["is_look"] for line in self.journal)
+
     @cached_property
     def tests(self) -> list[Test]:
         """The tests whose samples the result is fitted to, in order."""

@@ -39,7 +39,7 @@ def typeset(text: str) -> str:
     """Signs, and no break before a unit."""
     for plain, sign in _SIGNS:
         text = text.replace(plain, sign)
-    return re.sub(r"(\d) us\b", rf"\1{NBSP}µs", re.sub(r"(\d) ?%", rf"\1{NBSP}%", text))
+    return re.sub(r"([\d…]) us\b", rf"\1{NBSP}µs", re.sub(r"([\d…]) ?%", rf"\1{NBSP}%", text))
 
 
 def with_symbols(text: str) -> Markup:

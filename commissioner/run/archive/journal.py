@@ -29,7 +29,7 @@ class Journal:
     """A journal open for adding. What a power loss left of a torn last line is cut off first."""
 
     def __init__(self, path: Path) -> None:
-        whole = _drop_torn_line(path)
+        whole = drop_torn_line(path)
         self.records = whole.count(b"\n")
         self.head = digest(whole.rstrip(b"\n").rpartition(b"\n")[2]) if whole else FIRST
         self._file: TextIO = open(path, "a", encoding="utf-8", newline="\n", opener=open_no_link)  # noqa: SIM115
@@ -96,12 +96,15 @@ def _record(line: bytes) -> Record | None:
     return record if isinstance(record.get("kind"), str) and "record" in record else None
 
 
-def _drop_torn_line(path: Path) -> bytes:
+def whole_lines(path: Path) -> bytes:
+    """The journal without what a kill or a power loss left after its last line feed."""
+    data = path.read_bytes() if path.is_file() else b""
+    return data[: data.rfind(b"\n") + 1]
+
+
+def drop_torn_line(path: Path) -> bytes:
     """The whole lines, once what follows the last of them is cut off, so that what is added can be read."""
-    if not path.is_file():
-        return b""
-    data = path.read_bytes()
-    whole = data.rfind(b"\n") + 1
-    if whole < len(data):
-        os.truncate(path, whole)
-    return data[:whole]
+    whole = whole_lines(path)
+    if path.is_file() and path.stat().st_size > len(whole):
+        os.truncate(path, len(whole))
+    return whole

@@ -284,7 +284,7 @@ def _remarks(folder: Path, whole: list[Record], *, is_torn: bool, is_chained: bo
     else:
         yield "a chain without a seal does not stop somebody who computes it anew; --seal KEYFILE does"
     if is_torn:
-        yield "the last line of the journal is torn, as a kill or a power loss leaves it"
+        yield "the last line of the journal is torn, as a kill or a power loss leaves it: no whole record is lost; a copy leaves it out"
     started: Any = whole[0]["record"] if whole and whole[0]["kind"] == "run_started" else None
     if isinstance(started, dict) and started.get("run") != folder.name:
         yield f"the folder has another name than its run, {started.get('run')!s:.80}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,11 +89,12 @@ def unlike(root: Path, runs: Collection[str]) -> Mapping[str, str]:
     changed the index. By run, the name of the first value; empty where there is no index."""
     if not (root / NAME).is_file():
         return {}
-    place, seen = place_of(root), stamps(root)
-    rows = {row.run: row for row in _on_file(root, lambda store: _select(store, Wanted(), place, NAME)).rows}
+    place, seen = place_of(root), _stamps_of(root, runs)
+    wanted = Wanted(text=min(runs)) if len(runs) == 1 else Wanted()
+    rows = {row.run: row for row in _on_file(root, lambda store: _select(store, wanted, place, NAME)).rows}
     differ = dict[str, str]()
     for run, row in rows.items():
-        if run in runs and seen.get(run) == (row.journal_bytes, row.journal_mtime_ns):
+        if seen.get(run) == (row.journal_bytes, row.journal_mtime_ns):
             true = _row(root / run, place, seen[run])
             if other := [name for name in Row._fields if getattr(row, name) != getattr(true, name)]:
                 differ[run] = other[0]
@@ -113,12 +114,16 @@ def note(folder: Path) -> None:
 
 def stamps(root: Path) -> Stamps:
     """Of every folder with a journal; empty where there is no archive."""
-    found: dict[str, tuple[int, int]] = {}
     try:
         with os.scandir(root) as entries:
-            names = [entry.name for entry in entries]
+            return _stamps_of(root, [entry.name for entry in entries])
     except OSError:
-        return found
+        return {}
+
+
+def _stamps_of(root: Path, names: Iterable[str]) -> Stamps:
+    """Of those of the folders that have a journal."""
+    found: dict[str, tuple[int, int]] = {}
     prefix = f"{root}{os.sep}"
     for name in names:
         with suppress(OSError, ValueError):

@@ -343,11 +343,33 @@ async def run(request: Request, run: str) -> Response:
 
 
 @router.get("/runs/{run}/write-back")
+async def write_back_table(request: Request, run: str) -> Response:
+    """What the run learnt: register, now, will be."""
+    return await _table(request, run, "write-back")
+
+
 @router.get("/runs/{run}/restore")
-async def written_table(request: Request, run: str) -> Response:
-    """Register, now, will be: the table is the question."""
+async def restore_table(request: Request, run: str) -> Response:
+    """What the run found there: register, now, will be."""
+    return await _table(request, run, "restore")
+
+
+@router.post("/runs/{run}/write-back")
+async def write_back(request: Request, run: str) -> Response:
+    """It was agreed to."""
+    return await _written(request, run, "write-back")
+
+
+@router.post("/runs/{run}/restore")
+async def restore(request: Request, run: str) -> Response:
+    """It was agreed to."""
+    return await _written(request, run, "restore")
+
+
+async def _table(request: Request, run: str, what: Act) -> Response:
+    """The table is the question."""
     enter(request, Role.OPERATOR)
-    parts, what = parts_of(request), _act_of(request)
+    parts = parts_of(request)
     place = _place(parts, run)
     try:
         table = await plan(parts, run, what)
@@ -356,12 +378,9 @@ async def written_table(request: Request, run: str) -> Response:
     return render(request, WRITE, place, run=run, what=what, table=table)
 
 
-@router.post("/runs/{run}/write-back")
-@router.post("/runs/{run}/restore")
-async def write_table(request: Request, run: str) -> Response:
-    """It was agreed to."""
+async def _written(request: Request, run: str, what: Act) -> Response:
     who, fields = await enter_form(request)
-    parts, what = parts_of(request), _act_of(request)
+    parts = parts_of(request)
     place = _place(parts, run)
     try:
         done = await act(parts, run, what, fields.get("token", ""), who)
@@ -378,10 +397,6 @@ async def write_table(request: Request, run: str) -> Response:
         who_wrote=who.person,
         motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
     )
-
-
-def _act_of(request: Request) -> Act:
-    return "restore" if request.url.path.endswith("/restore") else "write-back"
 
 
 def _units(drive: Drive | None) -> dict[str, str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from commissioner.operations.history import share
 from commissioner.run.archive.documents import open_no_link
+from commissioner.run.archive.journal import whole_lines
 from commissioner.run.archive.verify import DAMAGED, verify
 from commissioner.run.index.index import JOURNAL
 from commissioner.service.contract.incoming import FileHere, JournalHere, OfferedRun
@@ -36,7 +37,7 @@ class Incoming:
         path = self._runs / run / JOURNAL
         there: JournalHere | None = None
         if path.is_file():
-            held = path.read_bytes()
+            held = whole_lines(path)
             there = {
                 "bytes": len(held),
                 "sha256": hashlib.sha256(held[:journal_bytes]).hexdigest(),

@@ -13,6 +13,7 @@ from commissioner.errors import CommissionerError, UsageError
 from commissioner.operations.archive import verify_runs
 from commissioner.run.archive.catalogue import read_runs
 from commissioner.run.archive.folder import RunFolder
+from commissioner.run.index import index
 from commissioner.run.index.index import ARCHIVE, find, note, refresh
 from commissioner.run.index.rows import CREATE, Row, Wanted
 from commissioner.run.index.store import NAME, check_url
@@ -209,6 +210,15 @@ def test_a_value_changed_in_the_index_is_found_by_verify_and_mended_by_a_rebuild
     assert one.losses == (loss,)
     refresh(root, rebuild=True)
     assert not verify_runs(root, run)[0].losses
+
+
+def test_to_verify_one_run_no_other_is_looked_at(root, monkeypatch):
+    refresh(root)
+    monkeypatch.setattr(index, "stamps", lambda _root: pytest.fail("every folder was looked at"))
+    select, found, run = index._select, [], by_folders(root)[3]
+    monkeypatch.setattr(index, "_select", lambda *asked: found.append(select(*asked)) or found[-1])
+    assert not index.unlike(root, {run})
+    assert [row.run for row in found[0].rows] == [run]
 
 
 def test_a_list_works_where_no_index_can_be_written(root):

@@ -82,6 +82,14 @@ def test_a_run_arrives_bit_for_bit_and_a_second_push_sends_nothing(service, run)
     assert [(entry["person"], entry["what"]) for entry in told] == [("otto", "took in a pushed run")]
 
 
+def test_what_a_power_loss_left_behind_the_journal_stays_at_home(service, run):
+    before = content(run)
+    with (run / "journal.jsonl").open("ab") as journal:
+        journal.write(4096 * b"\0")
+    assert [push(service, run).what for _ in range(2)] == ["copied", "there already"]
+    assert content(service.runs / run.name) == before
+
+
 def test_the_command_line_reads_the_password_from_a_file(service, run, tmp_path):
     secret = tmp_path / "password"
     secret.write_text(OTTO.password + "\n", encoding="utf-8")

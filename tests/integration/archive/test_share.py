@@ -97,6 +97,25 @@ def test_a_damaged_run_is_left_and_a_spoilt_copy_is_mended(root, tmp_path):
     assert content(tmp_path / "share" / spoilt) == content(root / spoilt)
 
 
+@pytest.mark.parametrize("tail", [4096 * b"\0", b'{"n": 402, "ki'])
+def test_what_a_power_loss_left_behind_the_journal_neither_spoils_nor_follows_the_run(root, tmp_path, tail):
+    """`verify` called it whole and `push` damaged; whatever is added to the run later is no other way than the copy's."""
+    folder = root / names(root)[0]
+    before = content(folder)
+    with (folder / "journal.jsonl").open("ab") as journal:
+        journal.write(tail)
+    seen = verify(folder)
+    assert seen.is_whole and any("torn" in remark and "copy leaves it out" in remark for remark in seen.remarks)
+    there = tmp_path / "share" / folder.name
+    assert [share.push(root, str(tmp_path / "share"), [folder.name])[0].what for _ in range(2)] == [
+        "copied",
+        "there already",
+    ]
+    assert content(there) == before
+    RunFolder(folder).close()
+    assert share.push(root, str(tmp_path / "share"), [folder.name])[0].what == "updated"
+
+
 def test_a_copy_that_broke_off_goes_on_where_it_was(root, tmp_path):
     run = names(root)[0]
     half = tmp_path / "share" / share.INCOMING / run

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
+
 import pytest
 
 from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.groups import runs
 from commissioner.cli.help import PURPOSES, only
 
 VERBS = [name for names in PURPOSES.values() for name in names]
@@ -54,3 +57,10 @@ def leaves(group, *path):
 @pytest.mark.parametrize("verb", list(leaves(app)), ids=" ".join)
 def test_every_verb_takes_json(verb, capsys):
     assert " --json " in said(capsys, *verb, "--help")
+
+
+def test_list_and_find_differ_in_their_words_only():
+    """Their thirteen options stood twice."""
+    find, listing = (inspect.signature(act, eval_str=True).parameters for act in (runs.runs_find, runs.runs_list))
+    assert list(find.items())[1:] == list(listing.items())
+    assert [name for name in find if name not in listing] == ["text"]

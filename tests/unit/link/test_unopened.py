@@ -42,10 +42,17 @@ def test_settings_that_a_line_does_not_take():
     assert "parity=N" in failure.remedy
 
 
-@pytest.mark.parametrize(
-    "error", [PermissionError(errno.EACCES, "denied"), OSError(errno.EBUSY, "busy"), OSError("PermissionError(13)")]
-)
-def test_a_port_that_somebody_else_holds(tmp_path, error):
+@pytest.mark.parametrize("number", [errno.EBUSY, errno.EAGAIN])
+def test_a_line_that_another_program_holds_is_no_matter_of_permission(tmp_path, number):
+    """Two drives on one line, and two programs: who was refused was sent to look for a group of users."""
+    failure = unopened(parse_url(f"rtu://{tmp_path}?device=2"), OSError(number, "busy"), "an open line")
+    assert failure.what == f"another program holds {tmp_path}"
+    assert "whichever of its drives" in failure.remedy
+    assert "group" not in failure.remedy
+
+
+@pytest.mark.parametrize("error", [PermissionError(errno.EACCES, "denied"), OSError("PermissionError(13)")])
+def test_a_port_that_this_user_may_not_open_or_that_somebody_holds(tmp_path, error):
     failure = unopened(parse_url(f"rtu://{tmp_path}"), error, "an open line")
     assert "another program holds it" in failure.what
 

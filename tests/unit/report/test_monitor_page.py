@@ -11,6 +11,8 @@ from commissioner.monitor.trend.indicators import in_words
 from commissioner.monitor.trend.trend import State, Verdict, Watched
 from commissioner.records import RPM
 from commissioner.report.monitoring import page
+from commissioner.report.monitoring.figures import resimulation, superimposed
+from commissioner.report.page import BLUE, GREEN, ORANGE, PURPLE, RED
 
 SEEN = SimpleNamespace(
     period=SimpleNamespace(speed_rad_per_s=np.array([150.0 - 1.5 / RPM, 150.0 + 1.5 / RPM])), findings=(),
@@ -63,3 +65,32 @@ def test_the_least_known_has_the_interval_of_the_table_above_it():
     found = cannot_be_fixed(fitted)
     assert found["relative_std"] == pytest.approx(0.1)
     assert "to ± 19.6%" in found["sentence"]
+
+
+def lightness(colour):
+    """CIE 1976 L* of an sRGB colour (IEC 61966-2-1)."""
+    linear = [
+        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+        for c in (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    ]
+    return 116 * float(np.dot((0.2126, 0.7152, 0.0722), linear)) ** (1 / 3) - 16
+
+
+def test_colours_are_told_apart_in_a_grey_print_and_are_seen_on_paper():
+    """All five lay within 14 L*, blue, red and purple within 0.4."""
+    seen = sorted(lightness(colour) for colour in (BLUE, ORANGE, GREEN, RED, PURPLE))
+    assert np.diff(seen).min() > 9
+    assert 1.05 / (((seen[-1] + 16) / 116) ** 3 + 0.05) > 3  # WCAG 2.1, 1.4.11: what is drawn against white
+
+
+def test_pulses_of_a_turn_differ_in_more_than_colour():
+    (panel,) = superimposed(SimpleNamespace(curves=np.arange(12.0).reshape(6, 2), per_turn=6)).axes
+    assert len({line._unscaled_dash_pattern for line in panel.lines}) == 6
+
+
+def test_measured_and_simulated_differ_in_width():
+    proof = SimpleNamespace(time_s=np.arange(9.0), measured_a=np.zeros(9) + 0j, simulated_a=np.ones(9) + 0j)
+    loads = [SimpleNamespace(frequency_hz=0.1)]
+    drawn = resimulation(SimpleNamespace(proof=proof, load_periods=loads, audited=SimpleNamespace(sample_period_s=1.0)))
+    measured, simulated = drawn.axes[0].lines
+    assert measured.get_linewidth() > 2 * simulated.get_linewidth()

@@ -12,7 +12,9 @@ from commissioner.identify.estimate.common_ground import Result
 from commissioner.motor.circuit import InverseGamma
 from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock
+from commissioner.report.run.evidence import iron
 from commissioner.report.run.page import run_page
+from commissioner.report.run.subject import Subject
 
 PLAN = {
     "axes_deg": [0.0, 60.0], "repeat_first": True, "supervision": {"watchdog_s": 0.5},
@@ -262,6 +264,29 @@ def test_a_run_that_ended_in_the_direct_currents_was_energised_and_says_so():
     block = SampleBlock(1, 0, 2e-4, 0.0, np.ones(5), np.ones(5), -np.ones(5), None, 540.0)
     assert "direct current; no test begun" in words(run_page(lost, JOURNAL, Findings(blocks=[(0, block)])))
     assert "no tests begun" in words(run_page(lost, JOURNAL, Findings()))
+
+
+def test_a_run_that_broke_off_counts_what_it_did_and_speaks_of_no_result():
+    """A test that came to its end stood among the missing, lost samples were "not known", and a chapter explained no interval."""
+    current = np.zeros(5)
+    block = SampleBlock(1, 10, 2e-4, 0.0, current, current, current, None, 540.0, lost_before=3)
+    finished = [line("axis_finished", {"axis_deg": 0.0, "is_look": is_look}) for is_look in (True, False)]
+    broken = result("faulted", written=False, parameters=None, gaps=None, magnetizing_curve=None)
+    text = run_page(broken, [*JOURNAL, *finished], Findings(blocks=[(0, block)]), None)
+    said = words(text)
+    assert "two tests of 3: the run ended before" in said
+    assert "Samples lost 3 of 5" in said
+    assert "Uncertainty" not in said
+    assert "B. Procedure, circuit" in said
+
+
+def test_the_results_dot_lies_inside_its_panel_also_beyond_the_measured_curve():
+    """The result, led on by the curve to 0.73 Wb, was drawn below the axis, over the caption."""
+    value = {"magnetizing_inductance_h": {"value": 0.28, "std": 0.0003}}
+    drawn = iron(Subject(result(parameters=value, holds_for_stator_flux_wb=0.95), JOURNAL, Findings(), {}))
+    (height,) = {float(y) for y in re.findall(r'<circle[^>]* cy="([\d.]+)"', drawn)}
+    (base,) = {float(y) for y in re.findall(r'class="ax" d="M28 ([\d.]+)H', drawn)}
+    assert height < base - 12
 
 
 def test_safe_torque_off_is_read_as_released_only_where_it_was_read():

@@ -339,6 +339,29 @@ def test_a_page_of_recordings_has_their_values_and_no_reason_for_a_good_one():
     assert "guard" not in text
 
 
+def test_sentences_of_many_cases_are_one_row_each_with_the_number_of_cases():
+    """The page showed no remark of a row, and a reason with a figure in it once for each case."""
+    told = "the currents lie {} us behind, L_M +- 1: taken into account\n{} rows left out of {} after t2"
+    rows = [
+        {"case": 0, "file": "a.csv", "outcome": "identified", "reason": "", "remarks": told.format("+11.9", 3, 800)},
+        {"case": 1, "file": "b.csv", "outcome": "identified", "reason": "", "remarks": told.format("-0.4", 12, 800)},
+        {"case": 2, "file": "c.csv", "outcome": "rejected", "reason": "R_s is uncertain: 1.2 %, limit 1 %"},
+        {"case": 3, "file": "d.csv", "outcome": "rejected", "reason": "R_s is uncertain: 4.2 %, limit 1 %"},
+        {"case": 4, "file": "e.csv", "outcome": "identified", "reason": "", "remarks": "axis 0: odd\naxis 60: odd"},
+    ]
+    seen = summarise(rows)
+    assert seen.reasons == {"rejected: R_s is uncertain: … %, limit 1 %": 2}
+    assert seen.remarks == {
+        "the currents lie … us behind, L_M +- 1: taken into account": 2,
+        "… rows left out of 800 after t2": 2,
+        "axis …: odd": 1,
+    }
+    text = page(rows, seen, "Study")
+    assert "Remarks" in text
+    assert "rows left out of 800" in text
+    assert "…\u00a0µs behind, L<sub>M</sub> ± 1" in text
+
+
 def dies_at_three(cases, _workers):
     """In place of a pool: case 0 takes longest, the worker at case 3 dies."""
     for case in sorted(cases, key=lambda one: one.number == 0):
