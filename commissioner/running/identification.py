@@ -79,13 +79,17 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     columns, shift = fit.columns, 0.0
     if record.has_speed and record.has_start:
         columns = (*columns, SPEED_LAG)
-        shift = refine(problem, fit.machine, columns, most=20, is_final=False).machine.value("speed_lag")
+        fit = refine(problem, fit.machine, columns, most=20, is_final=False)
+        shift = fit.machine.value("speed_lag")
         problem = _earlier(problem, shift)
         record = problem.record
-    fit = unbiased(problem, refine(problem, fit.machine, columns, most=20))
+    start = fit.machine.with_values({"speed_lag": fit.machine.value("speed_lag") - shift})
+    of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns, most=20)
+    by_lag = fit.machine.theta[: len(FOUR)] - of_slope if shift else np.zeros(len(FOUR))
+    fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
     noise_only = _of_four(fit, fit.covariance())
-    covariance = _of_four(fit, _covariance(problem, fit))
+    covariance = _of_four(fit, _covariance(problem, fit)) + np.outer(by_lag, by_lag)  # a filter or a counter: not known
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
         raise DataRefused(
