@@ -20,7 +20,7 @@ NAMES = (
     "line_re", "line_im", "dead_voltage", "dead_knee", "voltage_gain_re", "voltage_gain_im", "voltage_offset_re", "voltage_offset_im",
     "speed_gain", "speed_lag", "speed_ripple_cos", "speed_ripple_sin", "delay", "current_gain_v", "current_gain_w",
     "current_offset_u", "current_offset_v", "current_offset_w", "current_pair_u", "current_pair_v", "current_pair_w",
-    "inertia", "load_constant", "load_fan", "load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_ripple_sin_2",
+    "inertia", "load_constant", "load_linear", "load_fan", "load_breakaway", "load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_ripple_sin_2",
 )  # fmt: skip
 AT = {name: k for k, name in enumerate(NAMES)}
 COUNT = len(NAMES)

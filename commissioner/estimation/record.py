@@ -181,10 +181,16 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
 
 
 def _speed_noise(recordings: Sequence[RunningRecording], plate: Nameplate) -> float:
-    """Of the electrical speed, rad/s."""
-    return float(
-        np.median([noise_of(r.speed_rad_per_s) * plate.pole_pairs for r in recordings if r.speed_rad_per_s is not None])
-    )
+    """Of the electrical speed, rad/s: white noise, and the steps of a counter, which stands still in most sixth differences."""
+    speeds = [r.speed_rad_per_s for r in recordings if r.speed_rad_per_s is not None]
+    return plate.pole_pairs * float(np.median([np.hypot(noise_of(x), _step_of(x) / np.sqrt(12.0)) for x in speeds]))
+
+
+def _step_of(x: Array) -> float:
+    """Smallest change of a signal that comes in steps; next to nothing for one that does not."""
+    d = np.abs(np.diff(x))
+    d = d[d > 0.0]
+    return float(np.quantile(d, 0.05)) if d.size else 0.0
 
 
 def _refused(what: str, value: object, limit: object, remedy: str) -> DataRefused:

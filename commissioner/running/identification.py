@@ -13,9 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, unbiased, with_noise_of
+from commissioner.estimation.fit import (
+    Column,
+    Fit,
+    Machine,
+    Problem,
+    problem_of,
+    refine,
+    simulate,
+    unbiased,
+    with_noise_of,
+)
+from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import STATES, Record, first_part, prepare
+from commissioner.estimation.record import BLOCK_S, STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
@@ -27,8 +38,14 @@ Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
 """Between speeds that count as independent: the span over which they were smoothed."""
 AFTER_START_S = 0.15
-MOST_LEFT_OF_SPEED = 0.002
-"""Of synchronous speed, rms: what a constant and a fan load may leave of a run-up; more is another load, and the inertia is not given."""
+SPEED_LAG = Column("p", AT["speed_lag"])
+"""Every column of speed may be late: a counting interval, a filter."""
+PARTS = 10
+"""Of the run-up: left out one by one they show how far the inertia depends on each (jackknife: what is left is no white noise)."""
+MOST_LEFT_OF_SPEED, MOST_STD_OF_INERTIA = 0.002, 0.25
+"""Of synchronous speed, rms over the parts, what friction, linear and fan load may leave of a run-up; of the inertia. Beyond, it is not given."""
+LEAST_LAG_S, SURE = 3e-4, 5.0
+"""A lag of the speed that is said, and its size in standard deviations."""
 LEAST_OVER_NOISE = 0.3
 """Of the noise, left by the four numbers, from which a remark sends the reader to `diagnose`."""
 
@@ -59,8 +76,20 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     problem = problem_of(record, 0.0)
     fit = with_speed(problem) if record.has_speed else with_shaft(problem, smooth_load=record.has_start)
     problem = with_noise_of(problem, fit.machine)
-    fit = unbiased(problem, refine(problem, fit.machine, fit.columns, most=20))
-    covariance = _of_four(fit)
+    columns, shift = fit.columns, 0.0
+    if record.has_speed and record.has_start:
+        columns = (*columns, SPEED_LAG)
+        fit = refine(problem, fit.machine, columns, most=20, is_final=False)
+        shift = fit.machine.value("speed_lag")
+        problem = _earlier(problem, shift)
+        record = problem.record
+    start = fit.machine.with_values({"speed_lag": fit.machine.value("speed_lag") - shift})
+    of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns, most=20)
+    by_lag = fit.machine.theta[: len(FOUR)] - of_slope if shift else np.zeros(len(FOUR))
+    fit = unbiased(problem, fit)
+    late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
+    noise_only = _of_four(fit, fit.covariance())
+    covariance = _of_four(fit, _covariance(problem, fit)) + np.outer(by_lag, by_lag)  # a filter or a counter: not known
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
         raise DataRefused(
@@ -71,10 +100,10 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     inertia, load = _shaft(problem, fit, covariance)
     four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
-    bound = {name: quantity.std for name, quantity in _parameters(four, covariance / fit.scale).items()}
+    bound = {name: quantity.std for name, quantity in _parameters(four, noise_only / fit.scale).items()}
     return Identified(
         _parameters(four, covariance), bound, covariance, inertia, load, to_t_model(four, absolute), left,
-        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left),
+        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, late, inertia),
     )  # fmt: skip
 
 
@@ -97,10 +126,31 @@ def _until_first_step(record: Record) -> Record:
     return replace(record, windows=tuple(windows))
 
 
-def _of_four(fit: Fit) -> Array:
-    """Covariance of the logarithms of R_s, R_R, L_sigma, L_M."""
+def _earlier(problem: Problem, late_s: float) -> Problem:
+    """The same with its speeds read so much later: a lag that is long against what the speed does is a shift, and no slope."""
+    windows = []
+    for w in problem.record.windows:
+        time = 0.5 * problem.period * np.arange(2 * w.count - 1)
+        speed = np.stack([np.interp(time + late_s, time, x) for x in w.speed.T], axis=1)
+        windows.append(replace(w, speed=speed))
+    return replace(problem, record=replace(problem.record, windows=tuple(windows)))
+
+
+def _covariance(problem: Problem, fit: Fit) -> Array:
+    """Of the columns' numbers: never below what the sums of gradient over blocks of 20 ms scatter by, which hold what is left with a
+    structure of its own (cluster-robust: Liang, Zeger 1986, DOI 10.1093/biomet/73.1.13)."""
+    covariance = fit.covariance()
+    block = max(round(BLOCK_S / problem.period), 1) * (3 if problem.noise.has_zero else 2)
+    sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
+    scatter = np.sum((covariance / fit.scale @ sums) ** 2, axis=1)
+    wider = np.sqrt(np.maximum(scatter / np.maximum(covariance.diagonal(), 1e-300), 1.0))
+    return np.asarray(covariance * np.outer(wider, wider))
+
+
+def _of_four(fit: Fit, covariance: Array) -> Array:
+    """That of the logarithms of R_s, R_R, L_sigma, L_M."""
     own = [next(j for j, c in enumerate(fit.columns) if c.kind == "p" and c.index == AT[n]) for n in FOUR]
-    return fit.covariance()[np.ix_(own, own)]
+    return covariance[np.ix_(own, own)]
 
 
 def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
@@ -122,6 +172,7 @@ def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | No
     if fit.machine.has_shaft:
         load = {
             "constant_nm": fit.machine.value("load_constant") * torque,
+            "linear_at_synchronous_nm": fit.machine.value("load_linear") * torque,
             "fan_at_synchronous_nm": fit.machine.value("load_fan") * torque,
         }
         return Quantity(fit.machine.value("inertia"), fit.std("inertia")), load
@@ -135,44 +186,55 @@ def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | No
         theta[: len(FOUR)] += step
         moved = _inertia(problem, replace(fit.machine, theta=theta))
         spread += (moved[0][0] - values[0]) ** 2 if moved else 0.0
-    load = {"constant_nm": float(values[1]), "fan_at_synchronous_nm": float(values[2])}
+    load = {
+        "constant_nm": float(values[1]),
+        "linear_at_synchronous_nm": float(values[2]),
+        "fan_at_synchronous_nm": float(values[3]),
+    }
     return Quantity(float(values[0]), float(np.hypot(std, np.sqrt(spread)))), load
 
 
 def _inertia(problem: Problem, machine: Machine) -> tuple[Array, float] | None:
-    """(J, constant, fan) and the standard deviation of J from J w = J w0 + integral of (torque - constant - fan (w/w_s)^2)."""
+    """(J, constant, linear, fan) and the standard deviation of J from J w = J w0 + integral of (torque - load); None where no such
+    load makes the run-up."""
     record = problem.record
     for w, (_, shaft) in zip(record.windows, simulate(problem, machine), strict=True):
         if not w.is_from_rest:
             continue
-        last = int(np.flatnonzero(w.state == STATES.index("start")).max(initial=0)) + round(
-            AFTER_START_S / problem.period
-        )
-        last = min(last, w.count)
-        pairs, h = record.scales.pole_pairs, problem.period
-        speed = w.speed[: 2 * last - 1 : 2, 0] / pairs
-        share = speed * pairs / record.scales.frequency_rad_per_s
-        sums = [
-            np.concatenate([[0.0], np.cumsum(0.5 * h * (x[1:] + x[:-1]))])
-            for x in (shaft[:last, 1], np.sign(share) * (np.abs(share) > 0.01), share * np.abs(share))
-        ]
-        every = max(round(SPEED_STEP_S / h), 1)
-        # w = (1/J) I_torque - (c/J) I_constant - (f/J) I_fan + w0; the ripple of an encoder is fitted beside it
-        angle = np.cumsum(speed) * h
-        design = np.stack(
-            [sums[0], -sums[1], -sums[2], np.ones(last), np.cos(angle) * share, np.sin(angle) * share], axis=1
-        )[every:-every:every]
-        target = speed[every:-every:every]
-        if target.size < 20:
+        start = int(np.flatnonzero(w.state == STATES.index("start")).max(initial=0))
+        last = min(start + round(AFTER_START_S / problem.period), w.count)
+        design, speed = _run_up(problem, shaft[:last])
+        if speed.size < 2 * PARTS:
             return None
-        solved, *_ = np.linalg.lstsq(design, target, rcond=None)
-        rest = target - design @ solved
-        if float(np.sqrt(np.mean(rest**2))) > MOST_LEFT_OF_SPEED * record.scales.frequency_rad_per_s / pairs:
-            return None  # the load changed in the run-up
-        inverse = np.linalg.pinv(design.T @ design) * float(rest @ rest) / (target.size - 6)
-        j = 1.0 / solved[0]
-        return np.array([j, solved[1] * j, solved[2] * j]), float(j * j * np.sqrt(inverse[0, 0]))
+        parts = np.array_split(np.arange(speed.size), PARTS)
+        solved = _solved(design, speed)
+        rest = speed - design @ solved
+        synchronous = record.scales.frequency_rad_per_s / record.scales.pole_pairs
+        if np.sqrt(np.mean([rest[k].mean() ** 2 for k in parts])) > MOST_LEFT_OF_SPEED * synchronous:
+            return None
+        without = np.array([1.0 / _solved(np.delete(design, k, 0), np.delete(speed, k))[0] for k in parts])
+        j = 1.0 / float(solved[0])
+        std = float(np.sqrt((PARTS - 1) * without.var()))
+        return (j * np.array([1.0, *solved[1:4]]), std) if 0.0 < std < MOST_STD_OF_INERTIA * j else None
     return None
+
+
+def _run_up(problem: Problem, shaft: Array) -> tuple[Array, Array]:
+    """What adds up to the speed, and the speed: integrals of torque, friction, linear, fan and breaking away; a first speed; ripple of an encoder."""
+    h, scales = problem.period, problem.record.scales
+    speed = shaft[:, 0] / scales.pole_pairs
+    share = shaft[:, 0] / scales.frequency_rad_per_s
+    friction = share / np.sqrt(share**2 + SLOWEST2)
+    rates = (shaft[:, 1], -friction, -share, -share * np.abs(share), -friction * SLOW2 / (share**2 + SLOW2))
+    sums = [np.concatenate([[0.0], np.cumsum(0.5 * h * (x[1:] + x[:-1]))]) for x in rates]
+    angle = np.cumsum(speed) * h
+    design = np.stack([*sums, np.ones(speed.size), np.cos(angle) * share, np.sin(angle) * share], axis=1)
+    every = max(round(SPEED_STEP_S / h), 1)
+    return design[every:-every:every], speed[every:-every:every]
+
+
+def _solved(design: Array, target: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(design, target, rcond=None)[0])
 
 
 def _flux(record: Record) -> float:
@@ -184,7 +246,7 @@ def _flux(record: Record) -> float:
     return float(np.median(np.abs(tail)) / max(turn, 1e-9))
 
 
-def _remarks(record: Record, left: Lack) -> tuple[str, ...]:
+def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | None) -> tuple[str, ...]:
     out = list(record.remarks)
     worst = max(left.sigma, left.burst_sigma)
     if worst > LEAST_OVER_NOISE:
@@ -193,7 +255,13 @@ def _remarks(record: Record, left: Lack) -> tuple[str, ...]:
         )
     if not record.has_speed and record.has_start:
         out.append(
-            "No speed column: inertia and load come from the run-up, a constant torque and one that grows with the square of speed."
+            "No speed column: inertia and load come from the run-up: friction, and torques that grow with speed and with its square."
+        )
+    if abs(late.value) > max(LEAST_LAG_S, SURE * late.std):
+        out.append(f"The speed column is {1e3 * late.value:.2g} +- {2e3 * late.std:.1g} ms late: taken off.")
+    if record.has_speed and record.has_start and inertia is None:
+        out.append(
+            f"The inertia is not given: friction, linear and fan load leave more than {100 * MOST_LEFT_OF_SPEED:g} % of synchronous speed of this run-up, or leave the inertia open. Record a run-up with one steady load."
         )
     if not record.has_start:
         out.append("No start: the inertia is not in these data, and R_s is the least certain of the four.")

@@ -16,6 +16,8 @@ PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
 """A fit with unknown shaft grows with these: from all at once 20 of 60 ended in a wrong valley, so none of 60."""
 FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
 """What of the load is free in a prefix of this length: a fan is nothing before the shaft turns."""
+RUN_UP_LOAD = ("load_constant", "load_linear", "load_fan", "load_breakaway")
+"""Torque of a run-up over speed."""
 RUN_UP_TORQUE = 2.0
 """Mean accelerating torque of a start, of rated."""
 RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
@@ -117,7 +119,7 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
                 )
                 machine = _settled(problem.cut(seconds), machine, own)
     if smooth_load:
-        numbers = (*numbers, "load_constant", "load_fan", *LOAD_RIPPLE)
+        numbers = (*numbers, *RUN_UP_LOAD, *LOAD_RIPPLE)
         return refine(problem, machine, columns_of(numbers, record, machine), most=25)
     return refine(
         problem,

@@ -23,8 +23,13 @@ FOUR = {
 }
 
 
-def started(plate: Nameplate, *, voltage_noise_v: float = 0.5, **added: float) -> RunningRecording:
-    """Run-up in 0.3 s and two load steps, on mains with unbalance and a fifth; noise of 0.3 %."""
+def started(
+    plate: Nameplate, *, voltage_noise_v: float = 0.5, has_shaft: bool = False, **added: float
+) -> RunningRecording:
+    """Run-up in 0.3 s and two load steps, on mains with unbalance and a fifth; noise of 0.3 %.
+
+    `has_shaft`: the speed is that of `inertia` and the loads in `added`, without steps.
+    """
     rng, t = np.random.default_rng(4), 0.5 * PERIOD * np.arange(2 * COUNT_SAMPLES - 1)
     turn = np.exp(1j * (100 * np.pi * t + 0.4))
     u = 326.6 * (turn + 0.008 * np.conj(turn) + 0.01 * np.conj(turn) ** 5)
@@ -36,8 +41,9 @@ def started(plate: Nameplate, *, voltage_noise_v: float = 0.5, **added: float) -
     out, shaft = np.empty((COUNT_SAMPLES, 3)), np.empty((COUNT_SAMPLES, 2))
     march(
         p, scales_of(plate).as_tuple(), np.zeros(STATES), np.stack([u.real, u.imag], axis=1), np.stack([w, np.gradient(w, t)], axis=1),
-        np.zeros(2), np.zeros(t.size), PERIOD, False, out, shaft,
+        np.zeros(2), np.zeros(t.size), PERIOD, has_shaft, out, shaft,
     )  # fmt: skip
+    w = np.repeat(shaft[:, 0], 2)[:-1] if has_shaft else w
     i, axes = out[:, 0] + 1j * out[:, 1], np.exp(-2j * np.pi * np.arange(3) / 3)
     off = 100
     column = [np.concatenate([np.zeros(off), (i * a).real]) + 0.035 * rng.standard_normal(off + i.size) for a in axes]

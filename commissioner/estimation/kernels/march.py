@@ -49,7 +49,10 @@ HEAT_S, HEAT_R, CAGE, LOOP, LINE = (
 DEAD, DEAD_KNEE, V_GAIN, V_OFFSET = AT["dead_voltage"], AT["dead_knee"], AT["voltage_gain_re"], AT["voltage_offset_re"]
 W_GAIN, W_LAG, W_RIPPLE, DELAY = AT["speed_gain"], AT["speed_lag"], AT["speed_ripple_cos"], AT["delay"]
 GAIN, OFFSET, PAIR = AT["current_gain_v"], AT["current_offset_u"], AT["current_pair_u"]
-INERTIA, CONSTANT, FAN, RIPPLE = AT["inertia"], AT["load_constant"], AT["load_fan"], AT["load_ripple_cos"]
+INERTIA, CONSTANT, LINEAR, FAN = AT["inertia"], AT["load_constant"], AT["load_linear"], AT["load_fan"]
+BREAKAWAY, RIPPLE = AT["load_breakaway"], AT["load_ripple_cos"]
+SLOWEST2, SLOW2 = 1e-5, 1e-3
+"""Squares of the shares of synchronous speed over which a friction comes to its full torque, and over which that of breaking away is lost."""
 MOST_FLUX = 6.0
 """Square of the flux over rated flux beyond which the law of the iron goes on with its last value: a fit on its way."""
 HALF_3 = 0.5 * float(np.sqrt(3.0))
@@ -229,9 +232,11 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 part = places[m] - low
                 load = knots[low] * (1.0 - part) + knots[low + 1] * part
                 c, s = np.cos(y[9] / pairs), np.sin(y[9] / pairs)
-                turning = p[CONSTANT] + p[RIPPLE] * c + p[RIPPLE + 1] * s
+                turning = (
+                    p[CONSTANT] + p[BREAKAWAY] * SLOW2 / (share * share + SLOW2) + p[RIPPLE] * c + p[RIPPLE + 1] * s
+                )
                 turning += p[RIPPLE + 2] * (c * c - s * s) + p[RIPPLE + 3] * 2.0 * s * c
-                load += turning * share / np.sqrt(share * share + 1e-4) + p[FAN] * share * share
+                load += turning * share / np.sqrt(share * share + SLOWEST2) + share * (p[LINEAR] + p[FAN] * share)
                 k[stage, 8] = per_inertia * (torque / torque_n - load)
             k[stage, 9] = w
         if q < n - 1:

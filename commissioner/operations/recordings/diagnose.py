@@ -24,7 +24,7 @@ from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.operations.events import GoOn, Observe, always, nobody
-from commissioner.operations.ranges import require_distinct
+from commissioner.operations.ranges import require_distinct, require_independent
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed
@@ -106,6 +106,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     if are_sheets(tables):
         return _points(tables, request)
     require_whole_sheets(tables)
+    require_independent(tables)
     if any(t.is_running for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(document, request.out, running=running)

@@ -27,7 +27,7 @@ from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.plate_match import contradiction, doubt, rated_point, sure_mismatch
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.ranges import require_distinct
+from commissioner.operations.ranges import require_distinct, require_independent
 from commissioner.operations.recordings.trust import (
     Trust,
     refused,
@@ -116,6 +116,7 @@ def identify_any(
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     require_whole_sheets(tables)
+    require_independent(tables)
     if not any(t.is_running for t in tables):
         return identify(request, observe)
     from commissioner.operations.recordings.running import identified

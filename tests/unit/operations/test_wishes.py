@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from commissioner.errors import UsageError
+from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import verify_runs
+from commissioner.operations.ranges import require_independent
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifyRequest, identify_any
 from commissioner.operations.recordings.monitor import MonitorRequest, monitor
 from commissioner.operations.recordings.simulate import SimulateRequest, simulate
+from commissioner.recordings.table import Table
 
 NOWHERE = Path("nowhere.csv")
 
@@ -33,6 +36,20 @@ def test_learning_without_a_baseline_is_refused() -> None:
 def test_the_same_file_does_not_count_twice(tmp_path: Path, verb, wish) -> None:
     with pytest.raises(UsageError, match="is given twice"):
         verb(wish((tmp_path / "a.csv", tmp_path / "b" / ".." / "a.csv")))
+
+
+def _taken(seed: int, first: int = 0, last: int = 3000) -> Table:
+    rng = np.random.default_rng(seed)
+    columns = {f"current_{k}_a": rng.normal(size=3000).round(1)[first:last] for k in "uvw"}
+    return Table(columns, {}, f"{seed}-{first}.csv")
+
+
+def test_a_copy_or_an_excerpt_under_another_name_is_no_second_measurement() -> None:
+    require_independent([_taken(1), _taken(2)])
+    for again in (_taken(1), _taken(1, 700, 1400)):
+        with pytest.raises(DataRefused, match="the same measured samples") as refused:
+            require_independent([_taken(1), _taken(2), again])
+        assert refused.value.exit_code == 3
 
 
 def test_a_seed_below_zero_is_refused(tmp_path: Path) -> None:
