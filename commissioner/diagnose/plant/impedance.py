@@ -9,6 +9,9 @@ from commissioner.diagnose.intake.record import Record
 
 SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
+AUDIBLE = 10.0
+"""Times the median of the highest quarter of the spectrum, that a line of the current is at least: of noise it is 3.7 in the strongest of
+ten thousand bins, and would turn a line of 5. A random binary command asks at every frequency, and is answered by noise alone at most."""
 SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 
@@ -26,7 +29,8 @@ def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, 
     amps = np.fft.rfft(segment.axis_current_a * window)
     frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
     strong = np.flatnonzero(np.abs(volts) > 0.02 * np.abs(volts[1:]).max())
-    strong = strong[(strong > 0) & (np.abs(amps[strong]) > 0.0)]
+    floor = AUDIBLE * float(np.median(np.abs(amps[3 * amps.size // 4 :])))
+    strong = strong[(strong > 0) & (np.abs(amps[strong]) > floor)]
     if strong.size == 0:
         return [SILENT] * 2
     late = delay_s + 0.5 * record.facts.sample_period_s

@@ -174,7 +174,8 @@ class Model:
     def at_rest(self, layout: Layout) -> tuple[Array, Array]:
         """The four numbers of slow currents, (4,), which fill the bars, and their derivatives by `theta`, (4, 4 + terms).
 
-        The bars' branches g / (1 + s T) lie beside R_R: their conductance counts in full, and R^2 g T to L_sigma.
+        The bars' branches g / (1 + s T) lie beside R_R: their conductance counts in full, and X = R^2 g T lies in series with it, behind
+        L_M. The inverse-Gamma circuit of the same terminals has k = L_M / (L_M + X): k^2 R, L_sigma + k X, k L_M.
         """
         times_s = layout.branch_time_s
         rows = [4 + k for k, t in enumerate(self.terms) if t.kind == kinds.BRANCH and times_s[t.index] > 0.0]
@@ -187,9 +188,15 @@ class Model:
         derivatives = np.zeros((4, 4 + len(self.terms)))
         derivatives[[0, 1, 2, 3], [0, 1, 2, 3]] = self.nominal
         derivatives[1, 1], derivatives[1, rows] = low**2 * own, -(low**2) * steps
-        derivatives[2, 1] = 2.0 * low * delayed * derivatives[1, 1]
-        derivatives[2, rows] = 2.0 * low * delayed * derivatives[1, rows] + low**2 * times * steps
-        return np.array([self.nominal[0], low, self.nominal[2] + low**2 * delayed, self.nominal[3]]), derivatives
+        behind, l_m = low**2 * delayed, self.nominal[3]
+        of_behind = 2.0 * low * delayed * derivatives[1]
+        of_behind[rows] += low**2 * times * steps
+        k = l_m / (l_m + behind)
+        of_k = (behind * derivatives[3] - l_m * of_behind) / (l_m + behind) ** 2
+        derivatives[1] = 2.0 * k * low * of_k + k**2 * derivatives[1]
+        derivatives[2] += behind * of_k + k * of_behind
+        derivatives[3] = l_m * of_k + k * derivatives[3]
+        return np.array([self.nominal[0], k**2 * low, self.nominal[2] + k * behind, k * l_m]), derivatives
 
     def with_terms(self, terms: Sequence[Term]) -> Model:
         return Model(self.nominal, self.terms + tuple(terms), self.values + tuple(t.start for t in terms))
