@@ -74,7 +74,7 @@ class TrendChange(TypedDict):
 
 
 class TrendDocument(TypedDict):
-    """Oldest first; `changes` by parameter, empty of fewer than two points."""
+    """Oldest first; `changes` by parameter, empty of fewer than two points and where the first and the last cannot be compared."""
 
     motor: str
     points: list[TrendPoint]

@@ -8,6 +8,7 @@ from typing import Annotated, cast
 
 from fastapi import APIRouter, Query, Request
 
+from commissioner.errors import CommissionerError
 from commissioner.identify.contract import Measured
 from commissioner.service.access.visitors import Viewer, parts_of
 from commissioner.service.archive import Entry
@@ -70,7 +71,10 @@ def _point(entry: Entry, parameters: Mapping[str, Measured]) -> TrendPoint:
 def _changes(parts: Parts, points: list[TrendPoint]) -> dict[str, TrendChange]:
     from commissioner.operations.history.compare import compare_runs  # late: numpy
 
-    compared = compare_runs(parts.archive.root, points[0]["run"], points[-1]["run"]).comparison
+    try:
+        compared = compare_runs(parts.archive.root, points[0]["run"], points[-1]["run"]).comparison
+    except CommissionerError:  # one of the two tells not all four, or no error of one
+        return {}
     return {
         change.parameter: {
             "relative": change.relative_change,

@@ -40,18 +40,34 @@ def test_a_warmer_winding_is_no_change_of_the_motor(tmp_path, rotor, moved):
     assert changes["rotor_resistance_ohm"]["relative"] == pytest.approx(rotor - 1.0, abs=1e-3)
 
 
-def page(parts, language):
-    """The main part of the page of both runs."""
+def rendered(name, language, **facts):
+    """The main part of a page."""
     words = words_of(language)
     macros = environment().get_template("frame/parts.html").make_module(words)
     bare = DictLoader({"frame/base.html": "{% block main %}{% endblock %}"})
-    template = (
-        environment().overlay(loader=ChoiceLoader([bare, environment().loader])).get_template("shelves/compare.html")
-    )
+    template = environment().overlay(loader=ChoiceLoader([bare, environment().loader])).get_template(name)
+    said = template.render({**words, "p": macros, **facts})
+    return said.partition("<h1>")[2].replace(NBSP, " ").replace("&#39;", "'")
+
+
+def page(parts, language):
+    """Of both runs."""
     compared = plain(compare_runs(parts.archive.root, COLD, WARM))
     before, after = (parts.archive.find(name) for name in (COLD, WARM))
-    facts = {**words, "p": macros, "document": compared, "before": before, "after": after}
-    return template.render(facts).partition("<h1>")[2].replace(NBSP, " ").replace("&#39;", "'")
+    return rendered("shelves/compare.html", language, document=compared, before=before, after=after)
+
+
+def test_where_the_last_run_tells_no_error_the_points_still_stand(tmp_path):
+    parts = archive(tmp_path)
+    last = "20241201-081500-simulated-002abc"
+    spoilt = result_of(last, MACHINE, curve=CURVE)
+    for value in spoilt["parameters"].values():
+        value["std"] = None
+    make_run(tmp_path, last, result=spoilt, origin={"motor": "pump"})
+    document = trend_of(parts, "pump")
+    assert [point["run"] for point in document["points"]] == [COLD, WARM, last] and document["changes"] == {}
+    said = rendered("shelves/trend.html", "en", document=document, motor="pump")
+    assert "3.716</td>" in said and "3.716 ± 0.009</td>" in said and "σ)" not in said
 
 
 @pytest.mark.parametrize(("language", "verdict", "change"), [
