@@ -201,7 +201,12 @@ def judge(job: Job, findings: Findings) -> Step:
         recording, job.nameplate, winding_temperature_degc=findings.winding_degc, earlier=findings.look
     )
     findings.identification = identification
-    evidence = replace(evidence_of(identification), guard_acted=findings.guard_acted)
+    longer = findings.longer_test
+    evidence = replace(
+        evidence_of(identification),
+        guard_acted=findings.guard_acted,
+        beyond_time=longer.in_vain_for if longer else frozenset(),
+    )
     findings.plate_match = match_of(evidence.combined, job.nameplate)
     verdict = decide(evidence, job.nameplate, job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict

@@ -65,7 +65,7 @@ Values = Mapping[str, Quantity]
 class Evidence:
     """What the verdict is reached from: combined values, each test's values, each test's batch fit beside them, and each
     test's values at the flux all of them reached. `unlike`: why the axes differ more than by chance, in words, and by how much, relative; `lost_samples` of all tests;
-    `guard_acted`: the flux guard took the amplitude back."""
+    `guard_acted`: the flux guard took the amplitude back; `beyond_time`: names that a longer test would not make surer."""
 
     combined: Values
     axes: tuple[tuple[float, Values], ...]
@@ -74,6 +74,7 @@ class Evidence:
     unlike: tuple[tuple[str, float], ...] = ()
     lost_samples: int = 0
     guard_acted: bool = False
+    beyond_time: frozenset[str] = frozenset()
 
 
 def evidence_of(identification: Identification) -> Evidence:
@@ -102,7 +103,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
         *_another_motor(evidence.combined, plate),
         *_outside(evidence.combined, prior(plate)),
         *_disagreements(evidence, acceptance),
-        *_uncertain(evidence.combined, acceptance),
+        *_uncertain(evidence, acceptance),
         *_spread(evidence, acceptance),
         *(_unusual(evidence, acceptance) if acceptance.strict else ()),
     )
@@ -153,22 +154,26 @@ def _disagreements(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objec
                 )
 
 
-def _uncertain(combined: Mapping[str, Quantity], acceptance: Acceptance) -> Iterator[Objection]:
+def _uncertain(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
     for name in PARAMETERS:
-        quantity, limit = combined[name], getattr(acceptance, _LIMIT[name])
+        quantity, limit = evidence.combined[name], getattr(acceptance, _LIMIT[name])
         percent = 100 * quantity.std / abs(quantity.value) if quantity.value else float("inf")
         if not percent <= limit:
             yield Objection(
                 f"{name} is too uncertain",
                 f"{percent:.2g} % standard error",
                 f"{limit:g} %",
-                _surer(name),
+                _surer(name, time_helps=name not in evidence.beyond_time),
             )
 
 
-def _surer(name: str) -> str:
+def _surer(name: str, *, time_helps: bool) -> str:
     """What would make it surer. No time tells R_s from an inverter whose loss is much larger than R_s I."""
-    remedy = "lengthen excitation.seconds, or look for noise on the current sensors"
+    remedy = (
+        "lengthen excitation.seconds, or look for noise on the current sensors"
+        if time_helps
+        else "a longer test would not narrow it: compare the current sensors' gains and the three phases' resistances"
+    )
     if name != "stator_resistance_ohm":
         return remedy
     return f"{remedy}; behind a large dead time lower the switching frequency for the test, or raise limits.current_fraction"

@@ -1,4 +1,4 @@
-"""Small marks on a page: what is closed until somebody opens it, commands, and numbers behind a word."""
+"""What is closed on a page until somebody opens it, and open on paper."""
 
 from __future__ import annotations
 
@@ -18,8 +18,3 @@ def folded(summary: str, parts: Sequence[str | Picture]) -> Picture:
         for part in parts
     )
     return Picture(str(Markup("<details><summary>{}</summary>{}</details>").format(summary, inside)), "")
-
-
-def hinted(text: str, hint: str) -> Markup:
-    """A cell whose number shows when the pointer rests on it."""
-    return Markup('<span title="{}">{}</span>').format(hint, text)

@@ -165,8 +165,10 @@ td { border-bottom:1px solid var(--rule); padding:5px 10px 5px 0; vertical-align
 tr.good td:first-child { box-shadow:inset 3px 0 var(--good); padding-left:10px } tr.warn td:first-child { box-shadow:inset 3px 0 var(--warn); padding-left:10px }
 tr.bad td:first-child { box-shadow:inset 3px 0 var(--bad); padding-left:10px } figure { margin:8px 0 16px } figure svg,figure img { width:100%; height:auto }
 figcaption { color:var(--muted); font-size:13px } p { margin:0 0 10px; max-width:80ch } footer { color:var(--muted); font-size:12.5px }
-.wide { overflow-x:auto } @media print { body { background:#fff } header,section { border-color:#bbb }
-  header,figure,tr,section:not(:has(figure,table)) { break-inside:avoid } h2,thead { break-after:avoid } .wide { overflow:visible } }
+.wide { overflow-x:auto } @media print { body { background:#fff; font-size:12px } header,section { border-color:#bbb; padding:12px 16px; margin-bottom:10px } main { padding:0 }
+  .headline { font-size:18px } h2 { font-size:14px } table,caption,figcaption,footer,dt { font-size:11px } figure { margin:4px 0 8px }
+  header,figure,tr,section:not(:has(figure,table)) { break-inside:avoid } h2,thead { break-after:avoid }
+  summary,p:has(+ figure) { break-after:avoid } .wide { overflow:visible } summary { list-style:none; font-weight:600 } details::details-content { content-visibility:visible; display:block } }
 </style></head><body><main>
 <header><h1>{{ page.title }}</h1><p class="headline">{{ page.headline }}</p>
 <dl>{% for name, value in page.facts %}<div><dt>{{ name }}</dt><dd>{{ value }}</dd></div>{% endfor %}</dl></header>

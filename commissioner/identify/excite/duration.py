@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.identify.excite.tones import DesignedExcitation
-from commissioner.motor.circuit import QUANTILE, SYMBOLS, InverseGamma
+from commissioner.motor.circuit import PARAMETERS, QUANTILE, SYMBOLS, InverseGamma
 
 TIMES = 2.0
 
@@ -22,12 +22,17 @@ class LongerTest:
     then: tuple[float, ...]
 
     @property
+    def in_vain_for(self) -> frozenset[str]:
+        """Names of those that it would not make surer by a twentieth."""
+        return frozenset(name for name, a, b in zip(PARAMETERS, self.now, self.then, strict=True) if not b < 0.95 * a)
+
+    @property
     def sentence(self) -> str:
         """For the technician; says so where time would not help."""
         gains = [
             f"{name} {100 * QUANTILE * a:.2g} -> {100 * QUANTILE * b:.2g} %"
-            for name, a, b in zip(SYMBOLS, self.now, self.then, strict=True)
-            if b < 0.95 * a
+            for key, name, a, b in zip(PARAMETERS, SYMBOLS, self.now, self.then, strict=True)
+            if key not in self.in_vain_for
         ]
         if not gains:
             return (

@@ -37,6 +37,8 @@ from commissioner.text import split_address
 ANSWER_S = 120.0
 AT_ONCE = PIECE // 2
 """Bytes of one request; the service takes no larger ones."""
+LOG_IN = "/api/login"
+LOGGED_OUT = "push again: it logs in anew and goes on where it broke off; the account may have been taken away or changed in between"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -101,6 +103,8 @@ def _send(content: bytes, path: str, begun: Mapping[str, Any] | None, service: _
     for start in range(max(held, 0), max(len(content), 1), AT_ONCE):
         piece = content[start : start + AT_ONCE]
         service.ask("PUT", f"{path}?start={start}", piece, "application/octet-stream")
+    if begun is not None and int(begun["bytes"]) > len(content) > 0:  # what another left behind our end
+        service.ask("PUT", f"{path}?start={len(content)}", b"", "application/octet-stream")
     return len(content) - max(held, 0)
 
 
@@ -125,7 +129,7 @@ class _Service:
     def __enter__(self) -> _Service:
         try:
             if self._account is not None:
-                document = self.ask("POST", "/api/login", json.dumps(vars(self._account)).encode(), "application/json")
+                document = self.ask("POST", LOG_IN, json.dumps(vars(self._account)).encode(), "application/json")
                 self._headers["X-CSRF-Token"] = str(document["csrf"])
         except BaseException:
             self._connection.close()
@@ -159,7 +163,8 @@ class _Service:
                 limit="a running `commissioner serve`", remedy="look at the service, then repeat: the same call goes on where it broke off",
             ) from failure  # fmt: skip
         if answer.status >= 400:
-            remedy = "give --account NAME" if answer.status == 401 and self._account is None else document.get("remedy")
+            is_out = answer.status == 401 and path != LOG_IN
+            remedy = (LOGGED_OUT if self._account else "give --account NAME") if is_out else document.get("remedy")
             raise CommissionerError(
                 str(document.get("title", "refused")), step=str(document.get("step") or "push"), value=document.get("value"),
                 limit=document.get("limit"), remedy=str(remedy or ""),

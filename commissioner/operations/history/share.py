@@ -97,7 +97,16 @@ def _one(folder: Path, target: Path) -> Moved:
         relation = UPDATED  # what lies there was spoilt; ours is whole
     if relation in (THERE, NEWER):
         return Moved(folder.name, relation, 0, 0)
-    incoming = target / INCOMING / folder.name
+    try:
+        return _moved(folder, there, relation)
+    except FileNotFoundError:
+        if (there / JOURNAL).is_file() and _relation(folder, there) == THERE:  # another mover was faster
+            return Moved(folder.name, THERE, 0, 0)
+        raise
+
+
+def _moved(folder: Path, there: Path, relation: str) -> Moved:
+    incoming = there.parent / INCOMING / folder.name
     files, size = _copy(folder, incoming)
     drop_torn_line(incoming / JOURNAL)
     arrived = verify(incoming)
@@ -175,7 +184,12 @@ def _put_in_place(incoming: Path, there: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
     if there.exists():
         there.rename(old)
-    incoming.rename(there)
+    try:
+        incoming.rename(there)
+    except OSError:
+        with suppress(OSError):
+            old.rename(there)
+        raise
     shutil.rmtree(old, ignore_errors=True)
     with suppress(OSError):
         incoming.parent.rmdir()

@@ -17,7 +17,7 @@ from commissioner.report.sheet.marks import capitalised
 
 def where(document: Document, left: Residuals, has_causes: bool) -> Section:
     """Error over current, voltage, flux, slope; over time and axis."""
-    after = " Blue: what is left with the named causes; it should lie on zero." if has_causes else ""
+    after = f" {capitalised(figures.AFTER)}: what is left; it should lie on zero." if has_causes else ""
     shade = (
         " Shaded: the range that noise alone leaves (19 of 20 cases)."
         if figures.shade_is_visible(left, has_causes)
@@ -25,7 +25,7 @@ def where(document: Document, left: Residuals, has_causes: bool) -> Section:
     )
     return Section(
         "Where the simulation is wrong" if document["verdict"] != "nothing_significant" else "The error is noise",
-        f"Orange: measured minus simulated current, with the four numbers fitted as well as they can be.{after} The fit hides a part of "
+        f"{capitalised(figures.BEFORE)}: measured minus simulated current, with the four numbers fitted as well as they can be.{after} The fit hides a part of "
         "every cause, so these shapes are a hint and no proof; the names come from trying every cause of the catalogue.",
         picture(
             figures.over_quantities(left, has_causes),

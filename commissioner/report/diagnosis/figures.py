@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
-from typing import TYPE_CHECKING, ParamSpec
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from commissioner.diagnose.verdict.collinearity import Alike
 from commissioner.diagnose.verdict.residuals import Correlation, Residuals, Spectrum
 from commissioner.motor.circuit import QUANTILE
 from commissioner.report.diagnosis.names import spoken
-from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE
+from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, told_apart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +80,7 @@ def over_time_and_axis(seen: Residuals, has_causes: bool, noise_a: float | None)
     """Two panels: error rms over the recording's time, and for each axis; the noise where it is known."""
     figure = _figure(2.9)
     left, right = figure.subplots(1, 2, width_ratios=(2, 1), sharey=True)
-    _pair(left, seen.time_s, seen.time_before_a * 1e3, seen.time_after_a * 1e3, has_causes, ".")
+    _pair(left, seen.time_s, seen.time_before_a * 1e3, seen.time_after_a * 1e3, has_causes, is_dotted=True)
     left.set(xlabel="time / s", ylabel="size of the error / mA rms")
     if noise_a is not None:
         left.axhline(noise_a * 1e3, color=MUTED, linestyle="--", label="noise")
@@ -217,11 +217,15 @@ def _legend_above(figure: Figure, axes: Axes, columns: int = 4) -> None:
     figure.legend(*axes.get_legend_handles_labels(), ncols=columns, loc="outside upper center")
 
 
-def _pair(axes: Axes, x: Array, before: Array, after: Array, has_causes: bool, style: str = "-") -> None:
-    """The error before in orange and, where causes were named, after in blue."""
-    axes.plot(x, before, style, color=ORANGE, label=BEFORE)
+def _pair(axes: Axes, x: Array, before: Array, after: Array, has_causes: bool, *, is_dotted: bool = False) -> None:
+    """The error before and, where causes were named, after: lines, or crosses and dots."""
+    axes.plot(x, before, **(_dots(ORANGE, "x") if is_dotted else told_apart(ORANGE)), label=BEFORE)
     if has_causes:
-        axes.plot(x, after, style, color=BLUE, label=AFTER)
+        axes.plot(x, after, **(_dots(BLUE, ".") if is_dotted else told_apart(BLUE)), label=AFTER)
+
+
+def _dots(color: str, marker: str) -> dict[str, Any]:
+    return {"color": color, "linestyle": "", "marker": marker, "markersize": 4.0}
 
 
 def _figure(height: float, width: float = TOTAL_WIDTH) -> Figure:

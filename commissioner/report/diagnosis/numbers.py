@@ -42,6 +42,11 @@ def part_word(share: float, largest: float) -> str:
     return "large" if share >= 0.2 else "small" if share >= 0.01 else "tiny"
 
 
+def part_of_error(share: float, largest: float) -> str:
+    """`main (99.1 %)`: the word, which compares, and the number, on paper as on the screen."""
+    return f"{part_word(share, largest)} ({percent(share)})"
+
+
 def chance(p: float) -> str:
     """`1 in 5000`; a technician reads no exponents."""
     if p < 1e-6:

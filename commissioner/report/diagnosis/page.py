@@ -12,6 +12,7 @@ from commissioner.report.diagnosis import evidence, figures, sections
 from commissioner.report.diagnosis.numbers import PLUS_MINUS, number, percent
 from commissioner.report.diagnosis.words import Document, headline, tone
 from commissioner.report.page import Page, Section, picture
+from commissioner.report.sheet.marks import capitalised
 
 
 def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
@@ -33,7 +34,16 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
             sections.parameters(document),
             evidence.for_experts(document, left, has, alike),
         ]
-    parts.append(Section("The data", *(document["audit"] or ("Nothing unusual was found in the file.",))))
+    parts.append(
+        Section(
+            "The data",
+            *(
+                map(capitalised, document["audit"])
+                if document["audit"]
+                else ("Nothing unusual was found in the file.",)
+            ),
+        )
+    )
     return Page(
         title=f"Diagnosis: {name}",
         headline=headline(document),

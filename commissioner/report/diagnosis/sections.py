@@ -8,7 +8,7 @@ from typing import Any
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.motor.quantities import FIVE, Quantity
 from commissioner.report.diagnosis.names import Cause, class_name, plain_of, size_words, spoken, sure_words
-from commissioner.report.diagnosis.numbers import PLUS_MINUS, chance, limit_words, number, part_word, percent
+from commissioner.report.diagnosis.numbers import PLUS_MINUS, chance, limit_words, number, part_of_error, percent
 from commissioner.report.diagnosis.words import (
     Document,
     actions,
@@ -21,12 +21,15 @@ from commissioner.report.diagnosis.words import (
     remarks,
     tone,
 )
-from commissioner.report.folded import hinted
 from commissioner.report.page import Section, Table, Tone
 from commissioner.report.sheet.marks import coded
 
 SURE = 0.8
 """Names below this probability are marked."""
+PART = (
+    "Part: of the error's power, what comes back when this cause alone is left out; causes partly do the same, so parts do not "
+    "add up to 100 %."
+)
 NAMES = (
     *FIVE,
     Quantity("stator_inductance_h", "stator inductance", "L_s", 1e3, "mH"),
@@ -44,7 +47,7 @@ def what_it_means(document: Document) -> list[Section]:
 
 
 def causes(document: Document) -> list[Section]:
-    """One row per cause or class; the share as a word, its number on hovering. Nothing where the headline says all."""
+    """One row per cause or class. Nothing where the headline says all."""
     found = ordered(document)
     if not found:
         if document["verdict"] == "nothing_significant" and is_finished(document):
@@ -60,15 +63,11 @@ def causes(document: Document) -> list[Section]:
     rows, tones = [], list[Tone]()
     for cause in found:
         is_fit = cause["found_by"] == "fit"
-        part = hinted(
-            part_word(cause["gain_share"], largest),
-            f"{percent(cause['gain_share'])} of the error's power comes back when this cause alone is left out",
-        )
         rows.append(
             (
                 class_name(cause),
                 size_words(cause),
-                part if is_fit else "-",
+                part_of_error(cause["gain_share"], largest) if is_fit else "-",
                 f"{number(cause['strength_over_noise'], 2)} x noise" if is_fit else "-",
                 sure_words(cause),
                 _best_alternative(cause),
@@ -92,8 +91,7 @@ def causes(document: Document) -> list[Section]:
                 ),
                 rows,
                 tones,
-                caption=f"{PLUS_MINUS} Rest the pointer on the part to see its number; causes partly do the same, so parts do "
-                "not add up to 100 %. Next best name: the other cause that explains most of the same.",
+                caption=f"{PLUS_MINUS} {PART} Next best name: the other cause that explains most of the same.",
             ),
             *dict.fromkeys(said_of_others),
         )
@@ -212,7 +210,7 @@ def points_causes(document: Document) -> Section:
         (
             class_name(c),
             size_words(c),
-            hinted(part_word(c["gain_share"], largest), f"{percent(c['gain_share'])} comes back without it"),
+            part_of_error(c["gain_share"], largest),
             chance(c["p_value"]),
         )
         for c in found
@@ -225,7 +223,7 @@ def points_causes(document: Document) -> Section:
             ("cause", "size", "part of the error", "chance that scatter made it up"),
             rows,
             ["good"] * len(rows),
-            caption=PLUS_MINUS,
+            caption=f"{PLUS_MINUS} {PART}",
         ),
         *others,
     )

@@ -65,14 +65,16 @@ class TrendPoint(TypedDict):
 
 
 class TrendChange(TypedDict):
-    """From the first point to the last; `sigmas`: in their joint standard error."""
+    """From the first point to the last, as the two runs are compared: at one flux and temperature; `sigmas`: in what two tests of an
+    unchanged motor differ by."""
 
     relative: float
     sigmas: float
+    is_beyond_chance: bool
 
 
 class TrendDocument(TypedDict):
-    """Oldest first; `changes` by parameter, empty of fewer than two points."""
+    """Oldest first; `changes` by parameter, empty of fewer than two points and where the first and the last cannot be compared."""
 
     motor: str
     points: list[TrendPoint]

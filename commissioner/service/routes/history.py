@@ -8,8 +8,8 @@ from typing import Annotated, cast
 
 from fastapi import APIRouter, Query, Request
 
+from commissioner.errors import CommissionerError
 from commissioner.identify.contract import Measured
-from commissioner.motor.circuit import PARAMETERS
 from commissioner.service.access.visitors import Viewer, parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed
@@ -58,19 +58,28 @@ async def trend(request: Request, motor: str, _who: Viewer) -> TrendDocument:
 
 
 def trend_of(parts: Parts, motor: str) -> TrendDocument:
-    """The points, and of each parameter the change from the first to the last in units of their joint standard error."""
+    """The points, and of each parameter the change from the first to the last as the two are compared."""
     entries = [e for e in parts.archive.entries(limit=1000) if e.motor == motor and e.outcome == "commissioned"]
     points = [_point(entry, entry.parameters) for entry in reversed(entries) if entry.parameters]
-    changes = {name: _change(points, name) for name in PARAMETERS} if len(points) > 1 else {}
-    return {"motor": motor, "points": points, "changes": changes}
+    return {"motor": motor, "points": points, "changes": _changes(parts, points) if len(points) > 1 else {}}
 
 
 def _point(entry: Entry, parameters: Mapping[str, Measured]) -> TrendPoint:
     return {"run": entry.run, "utc": entry.utc, "flux_wb": entry.flux_wb, "parameters": parameters}
 
 
-def _change(points: list[TrendPoint], name: str) -> TrendChange:
-    first, last = points[0]["parameters"][name], points[-1]["parameters"][name]
-    joint = ((first["std"] or 0.0) ** 2 + (last["std"] or 0.0) ** 2) ** 0.5
-    change = last["value"] - first["value"]
-    return {"relative": change / first["value"], "sigmas": abs(change) / joint if joint > 0 else 0.0}
+def _changes(parts: Parts, points: list[TrendPoint]) -> dict[str, TrendChange]:
+    from commissioner.operations.history.compare import compare_runs  # late: numpy
+
+    try:
+        compared = compare_runs(parts.archive.root, points[0]["run"], points[-1]["run"]).comparison
+    except CommissionerError:  # one of the two tells not all four, or no error of one
+        return {}
+    return {
+        change.parameter: {
+            "relative": change.relative_change,
+            "sigmas": change.sigmas,
+            "is_beyond_chance": change.sigmas > compared.limit_sigmas,
+        }
+        for change in compared.changes
+    }

@@ -40,7 +40,8 @@ async def offered(
 async def piece(
     request: Request, run: Run, file: File, _who: Operator, start: Annotated[int, Query(ge=0, le=LARGEST)] = 0
 ) -> KeptPiece:
-    """The body is a piece of the file, from byte `start` on; what stood there goes. 409: a piece before it is missing."""
+    """The body is a piece of the file, from byte `start` on: what stands there already is left, else what followed goes; empty, it
+    ends the file there. 409: a piece before it is missing."""
     body = await request.body()
     held = await asyncio.to_thread(parts_of(request).incoming.keep, run, file, start, body)
     return {"run": run, "file": file, "bytes": held}

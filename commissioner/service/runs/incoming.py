@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import threading
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from commissioner.operations.history import share
@@ -22,13 +24,16 @@ LARGEST, MOST_FILES = 2_000_000_000, 100
 """Bytes of one file, files of one run."""
 FORGOTTEN_S = 7 * 86400.0
 """What broke off and was never gone on with is removed after so long."""
+AGAIN = "push it again: only what is missing is sent (another push of the same run may have ended in the meantime)"
 
 
 class Incoming:
-    """`root`: where runs stand until they are whole; `runs`: the archive."""
+    """`root`: where runs stand until they are whole; `runs`: the archive. Who pushes the same run at the same time shares its
+    files here: one call at a time, and none takes away what another sent."""
 
     def __init__(self, root: Path, runs: Path) -> None:
         self._root, self._runs = root, runs
+        self._alone: dict[str, threading.Lock] = {}
 
     def offered(self, run: str, journal_bytes: int) -> OfferedRun:
         """What is here of a run: its journal in the archive (bytes, and the digest of at most `journal_bytes` of them), whether
@@ -43,45 +48,59 @@ class Incoming:
                 "sha256": hashlib.sha256(held[:journal_bytes]).hexdigest(),
                 "is_damaged": len(held) == journal_bytes and verify(path.parent).state == DAMAGED,
             }
-        folder = self._root / run
-        begun = sorted(path for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
-        return {"run": run, "journal": there, "begun": {path.name: _state(path) for path in begun}}
+        with self._alone_with(run) as folder:
+            return {"run": run, "journal": there, "begun": {path.name: _state(path) for path in _files(folder)}}
 
     def keep(self, run: str, file: str, start: int, piece: bytes) -> int:
-        """The bytes that are here of a file once `piece` stands at `start`. Refusal: a gap, or more than a run has."""
-        folder = self._root / run
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        path = folder / file
-        held = path.stat().st_size if path.is_file() else 0
-        if start > held:
-            raise Refusal(409, "a piece is missing before this one", step="push", value=start, limit=held,
-                          remedy="go on where the file ends: GET this run says where")  # fmt: skip
-        if start + len(piece) > LARGEST or (not path.exists() and len(list(folder.iterdir())) >= MOST_FILES):
-            raise Refusal(413, "no run is so large", step="push", value=start + len(piece),
-                          limit=f"{LARGEST} bytes a file, {MOST_FILES} files", remedy="copy it by hand to a share")  # fmt: skip
-        with open(path, "r+b" if held else "wb", opener=open_no_link) as target:
-            target.truncate(start)
-            target.seek(start)
-            target.write(piece)
-        return start + len(piece)
+        """The bytes that are here of a file once `piece` stands at `start`: what stands there already is left, else what followed
+        goes; an empty piece ends the file. Refusal: a gap, or more than a run has."""
+        with self._alone_with(run) as folder:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            path = folder / file
+            held = path.stat().st_size if path.is_file() else 0
+            if start > held:
+                raise Refusal(
+                    409, "a piece is missing before this one", step="push", value=start, limit=held, remedy=AGAIN
+                )
+            if start + len(piece) > LARGEST or (not path.exists() and len(list(folder.iterdir())) >= MOST_FILES):
+                raise Refusal(413, "no run is so large", step="push", value=start + len(piece),
+                              limit=f"{LARGEST} bytes a file, {MOST_FILES} files", remedy="copy it by hand to a share")  # fmt: skip
+            with open(path, "r+b" if held else "w+b", opener=open_no_link) as target:
+                target.seek(start)
+                if piece and target.read(len(piece)) == piece:
+                    return held
+                target.truncate(start)
+                target.seek(start)
+                target.write(piece)
+            return start + len(piece)
 
     def arrive(self, run: str, files: Collection[str]) -> share.Moved:
-        """All `files` are here: prove the run by its chain and put it in place. Refusal: its journal has not come."""
-        folder = self._root / run
-        if JOURNAL not in files or not (folder / JOURNAL).is_file():
-            raise Refusal(409, "the run's journal has not come", step="push", value=", ".join(sorted(files))[:200], limit=JOURNAL,
-                          remedy="send it with PUT, then say again that all is here")  # fmt: skip
-        for path in list(folder.iterdir()) if folder.is_dir() else []:
-            if path.name not in files:
-                path.unlink()
-        (moved,) = share.push(self._root, str(self._runs), [run])
-        shutil.rmtree(folder, ignore_errors=True)
-        return moved
+        """All `files` are here: prove the run by its chain and put it in place. Refusal: one has not come."""
+        with self._alone_with(run) as folder:
+            here = _files(folder)
+            if missing := {JOURNAL, *files} - {path.name for path in here}:
+                raise Refusal(409, "not every file of the run is here", step="push", value=", ".join(sorted(missing))[:200],
+                              limit=f"{JOURNAL} and every file named", remedy=AGAIN)  # fmt: skip
+            for path in here:
+                if path.name not in files:
+                    path.unlink()
+            (moved,) = share.push(self._root, str(self._runs), [run])
+            shutil.rmtree(folder, ignore_errors=True)
+            return moved
+
+    @contextmanager
+    def _alone_with(self, run: str) -> Iterator[Path]:
+        with self._alone.setdefault(run, threading.Lock()):
+            yield self._root / run
 
     def _forget(self) -> None:
         for folder in self._root.iterdir() if self._root.is_dir() else ():
             if time.time() - folder.stat().st_mtime > FORGOTTEN_S:
                 shutil.rmtree(folder, ignore_errors=True)
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
 
 
 def _state(path: Path) -> FileHere:

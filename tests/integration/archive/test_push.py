@@ -1,14 +1,17 @@
 """Runs to a service: only with an account that may, only what it lacks, whole or not at all."""
 
 import shutil
+import socket
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from unittest import mock
 
 import httpx
 import numpy as np
 import pytest
 
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.operations.history.send import Account, send
+from commissioner.operations.history.send import LOGGED_OUT, Account, _Service, send
 from commissioner.records import SampleBlock
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.verify import verify
@@ -145,6 +148,113 @@ def test_a_copy_that_is_not_what_was_read_never_gets_into_the_archive(service, r
     assert push(service, spoilt).what == "left: damaged"
 
 
+def pieces(files):
+    """(name, start, piece) of all files in the order of a push."""
+    for name in sorted(files):
+        for start in range(0, len(files[name]) or 1, 500_000):
+            yield name, start, files[name][start : start + 500_000]
+
+
+def test_two_pushes_of_one_run_at_once_take_nothing_from_each_other(service, tmp_path):
+    """The second begins from the start when the first has sent everything, and is overtaken."""
+    run = make_run(tmp_path / "laptop", "both", 2500)
+    files = content(run)
+    path, names = f"/api/incoming/{run.name}", {"files": sorted(files)}
+    with logged_in(service) as first, logged_in(service) as second:
+
+        def put(client, name, start, piece):
+            return client.put(f"{path}/{name}?start={start}", content=piece)
+
+        assert all(put(first, *one).status_code == 200 for one in pieces(files))
+        held = put(second, *next(pieces(files))).json()
+        assert (held["file"], held["bytes"]) == ("blocks.bin", len(files["blocks.bin"]))
+        assert first.post(path, json=names).json()["what"] == "copied"
+        overtaken = put(second, "blocks.bin", 500_000, files["blocks.bin"][500_000:1_000_000])
+        assert (overtaken.status_code, overtaken.json()["limit"]) == (409, 0)
+        assert put(second, "journal.jsonl", 0, files["journal.jsonl"]).status_code == 200
+        half = second.post(path, json=names)
+        assert half.status_code == 409 and "blocks.bin" in half.json()["value"]
+        assert "push it again" in overtaken.json()["remedy"] and "push it again" in half.json()["remedy"]
+    assert content(service.runs / run.name) == files
+    assert push(service, run).what == "there already"
+
+
+def test_a_killed_run_of_which_a_file_is_missing_has_not_arrived(service, tmp_path):
+    """No closing record covers its files: that they were named is all that is known of them."""
+    folder = RunFolder.create(tmp_path / "laptop", "killed")
+    folder.journal("job", {"a": 1})
+    folder.save("snapshot.json", {"a": 1})
+    folder.close()
+    (folder.path / "summary.json").unlink(missing_ok=True)
+    files = content(folder.path)
+    path = f"/api/incoming/{folder.path.name}"
+    with logged_in(service) as client:
+        assert client.put(f"{path}/journal.jsonl", content=files["journal.jsonl"]).status_code == 200
+        answer = client.post(path, json={"files": sorted(files)})
+        assert (answer.status_code, answer.json()["value"]) == (
+            409,
+            ", ".join(sorted(files.keys() - {"journal.jsonl"})),
+        )
+    assert not (service.runs / folder.path.name).exists()
+
+
+def test_many_pushes_of_one_run_at_once_leave_it_whole(service, tmp_path):
+    run = make_run(tmp_path / "laptop", "many", 2500)
+
+    def told(_):
+        try:
+            return push(service, run).what
+        except CommissionerError as refused:
+            assert refused.remedy.startswith("push it again"), vars(refused)
+            return "again"
+
+    with ThreadPoolExecutor(4) as pool:
+        what = list(pool.map(told, range(4)))
+    assert set(what) <= {"copied", "there already", "again"} and "copied" in what
+    assert content(service.runs / run.name) == content(run)
+
+
+def test_what_an_earlier_push_left_behind_the_end_of_a_file_goes(service, run):
+    with logged_in(service) as client:
+        longer = content(run)["result.json"] + b"more"
+        assert client.put(f"/api/incoming/{run.name}/result.json", content=longer).status_code == 200
+    assert push(service, run).what == "copied"
+    assert content(service.runs / run.name) == content(run)
+
+
+def test_who_is_taken_off_the_list_in_mid_push_is_refused_and_another_goes_on(service, tmp_path):
+    run = make_run(tmp_path / "laptop", "revoked", 2500)
+    accounts = Accounts(service.runs / ".service" / "accounts.json")
+    accounts.add("gone", Role.OPERATOR, "operating 5678")
+    ask, puts = _Service.ask, []
+
+    def asking(self, method, *more):
+        puts.extend([method] if method == "PUT" else [])
+        if len(puts) == 2 and "gone" in {one.name for one in accounts.all()}:
+            accounts.remove("gone")
+        return ask(self, method, *more)
+
+    with mock.patch.object(_Service, "ask", asking), pytest.raises(CommissionerError) as refused:
+        push(service, run, Account("gone", "operating 5678"))
+    assert (refused.value.step, refused.value.remedy) == ("access", LOGGED_OUT)
+    with pytest.raises(CommissionerError, match="name or password is wrong"):
+        push(service, run, Account("gone", "operating 5678"))
+    assert not (service.runs / run.name).exists()
+    moved = push(service, run)
+    assert moved.what == "copied" and moved.bytes < sum(map(len, content(run).values()))
+
+
+def test_a_piece_whose_line_broke_is_not_kept_and_nobody_sees_a_traceback(service, run):
+    with logged_in(service) as client:
+        cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+        head = (f"PUT /api/incoming/{run.name}/journal.jsonl HTTP/1.1\r\nHost: 127.0.0.1:{service.port}\r\nCookie: {cookie}\r\n"
+                f"x-csrf-token: {client.headers['x-csrf-token']}\r\nContent-Length: 100000\r\n\r\n")  # fmt: skip
+        with socket.create_connection(("127.0.0.1", service.port)) as line:
+            line.sendall(head.encode() + b"{" * 5000)
+        assert client.get(f"/api/incoming/{run.name}").json()["begun"] == {}
+    assert push(service, run).what == "copied"
+
+
 @pytest.mark.parametrize(("letter", "count"), [("a", 150), ("ä", 117), ("ä", 150), ("\U00010400", 150)])
 def test_a_name_that_no_disk_takes_is_a_name_too_long_and_no_full_disk(service, letter, count):
     """A letter beyond ASCII takes two bytes or more of the 255 that a file's name may have."""
@@ -167,7 +277,7 @@ def test_without_its_journal_a_run_has_not_arrived(service):
     with logged_in(service) as client:
         assert client.put("/api/incoming/20260101-010101-c/blocks.bin", content=b"{}").status_code == 200
         answer = client.post("/api/incoming/20260101-010101-c", json={"files": ["blocks.bin"]})
-    assert (answer.status_code, answer.json()["limit"]) == (409, "journal.jsonl")
+    assert (answer.status_code, answer.json()["limit"]) == (409, "journal.jsonl and every file named")
 
 
 def test_a_later_state_follows_an_older_never_wins_and_two_ways_are_told(service, run, tmp_path):

@@ -172,3 +172,23 @@ def test_links_are_not_followed(root, tmp_path):
     share.push(root, str(tmp_path / "share"), [run])
     assert not (tmp_path / "share" / run / "link").exists()
     shutil.rmtree(tmp_path / "share")
+
+
+@pytest.mark.parametrize("step", ["_copy_file", "_put_in_place"])
+def test_a_mover_that_another_one_overtakes_takes_nothing_away(root, tmp_path, monkeypatch, step):
+    """The other one is through between two steps of this one, over an older state that lay there."""
+    target, run = tmp_path / "share", names(root)[0]
+    share.push(root, str(target), [run])
+    folder = RunFolder(root / run)
+    folder.journal("snapshot_restored", {})
+    folder.close()
+    original = getattr(share, step)
+
+    def overtaken(*more):
+        monkeypatch.setattr(share, step, original)
+        assert [one.what for one in share.push(root, str(target), [run])] == ["updated"]
+        return original(*more)
+
+    monkeypatch.setattr(share, step, overtaken)
+    assert [one.what for one in share.push(root, str(target), [run])] == ["there already"]
+    assert content(target / run) == content(root / run)

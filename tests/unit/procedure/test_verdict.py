@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
+from commissioner.identify.excite.duration import LongerTest
+from commissioner.motor.circuit import PARAMETERS, SYMBOLS, InverseGamma, Quantity
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.verdict import Decision, Evidence, decide
 from commissioner.settings import load_motor, load_procedure
@@ -43,6 +44,22 @@ def test_without_saturation_the_values_themselves_are_compared():
     axes = ((0.0, VALUES), (60.0, with_magnetizing(0.9)))
     evidence = replace(Evidence(VALUES, axes), at_one_flux=())
     assert decide(evidence, PLATE, ACCEPTANCE, write_back=True).decision is Decision.REJECT
+
+
+def test_no_longer_test_is_asked_for_where_it_would_not_make_the_value_surer():
+    """Twice the time leaves the first three as they are and narrows the last by the root of two."""
+    longer = LongerTest(9.2, (0.1,) * 4, (0.1, 0.1, 0.099, 0.0707))
+    wide = {name: Quantity(value.value, 0.1 * value.value) for name, value in VALUES.items()}
+    evidence = replace(Evidence(wide, ((0.0, wide),)), beyond_time=longer.in_vain_for)
+    told = {o.what.split()[0]: o.remedy for o in decide(evidence, PLATE, ACCEPTANCE, write_back=True).objections}
+    assert set(told) == set(PARAMETERS)
+    asks_for_time = {name for name, remedy in told.items() if remedy.startswith("lengthen")}
+    assert (
+        asks_for_time
+        == {"magnetizing_inductance_h"}
+        == {n for n, s in zip(PARAMETERS, SYMBOLS, strict=True) if f"{s} " in longer.sentence}
+    )
+    assert all("longer test would not" in told[name] for name in PARAMETERS if name not in asks_for_time)
 
 
 def small_motor():

@@ -23,7 +23,7 @@ for (const element of document.querySelectorAll("[data-trend]")) {
   const axis = { stroke: () => css("--ink2"), grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
   const pad = 0.06 * (times.at(-1) - times[0]) || 86400;
   const made = new uPlot({
-    ...size(), legend: { show: false }, cursor: { show: false },
+    ...size(), padding: [null, 36, null, null], legend: { show: false }, cursor: { show: false },
     scales: { x: { time: true, range: [times[0] - pad, times.at(-1) + pad] }, y: { range: [low - margin, high + margin] } },
     axes: [{ ...axis, size: 28, space: 90, values: (u, at) => at.map((t) => new Date(1000 * t).toISOString().slice(0, 10)) }, { ...axis, size: 56, values: (u, at) => at.map((v) => number(v, v < 10 ? 3 : v < 100 ? 2 : 1)) }],
     series: [{}, { stroke: "transparent", width: 0, points: { show: false } }], hooks: { draw: [marks] },

@@ -1,0 +1,88 @@
+"""Two runs beside each other and a motor over the years: what moved is told at one flux and one winding temperature."""
+
+from types import SimpleNamespace
+
+import pytest
+from jinja2 import ChoiceLoader, DictLoader
+
+from commissioner.encoding import plain
+from commissioner.identify.estimate.axes import Identity
+from commissioner.operations.history.compare import compare_runs
+from commissioner.report.sheet.words import NBSP
+from commissioner.service.archive import Archive
+from commissioner.service.page.frame import environment, words_of
+from commissioner.service.routes.history import trend_of
+from tests.support.archive.synthetic import MACHINE, make_run, result_of
+
+COPPER_PER_K = 1.0 / (235.0 + 20.0)
+COLD, WARM = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
+CURVE = ((0.1, 0.32), (0.716, 0.3091), (0.8, 0.299))
+
+
+def archive(root, rotor=1.0):
+    """A motor at 20 and at 45 °C, both resistances as copper's, its rotor's `rotor` times that."""
+    warmth = 1.0 + 25.0 * COPPER_PER_K
+    warm = MACHINE | {
+        "stator_resistance_ohm": warmth * MACHINE["stator_resistance_ohm"],
+        "rotor_resistance_ohm": rotor * warmth * MACHINE["rotor_resistance_ohm"],
+    }
+    for name, machine, degc in ((COLD, MACHINE, 20.0), (WARM, warm, 45.0)):
+        make_run(root, name, result=result_of(name, machine, degc=degc, curve=CURVE), origin={"motor": "pump"})
+    return SimpleNamespace(archive=Archive(root))
+
+
+@pytest.mark.parametrize(("rotor", "moved"), [(1.0, set()), (1.1, {"rotor_resistance_ohm"})])
+def test_a_warmer_winding_is_no_change_of_the_motor(tmp_path, rotor, moved):
+    changes = trend_of(archive(tmp_path, rotor), "pump")["changes"]
+    assert set(changes) == set(MACHINE)
+    assert {name for name, change in changes.items() if change["is_beyond_chance"]} == moved
+    assert changes["stator_resistance_ohm"]["relative"] == pytest.approx(0.0, abs=1e-3)
+    assert changes["rotor_resistance_ohm"]["relative"] == pytest.approx(rotor - 1.0, abs=1e-3)
+
+
+def rendered(name, language, **facts):
+    """The main part of a page."""
+    words = words_of(language)
+    macros = environment().get_template("frame/parts.html").make_module(words)
+    bare = DictLoader({"frame/base.html": "{% block main %}{% endblock %}"})
+    template = environment().overlay(loader=ChoiceLoader([bare, environment().loader])).get_template(name)
+    said = template.render({**words, "p": macros, **facts})
+    return said.partition("<h1>")[2].replace(NBSP, " ").replace("&#39;", "'")
+
+
+def page(parts, language):
+    """Of both runs."""
+    compared = plain(compare_runs(parts.archive.root, COLD, WARM))
+    before, after = (parts.archive.find(name) for name in (COLD, WARM))
+    return rendered("shelves/compare.html", language, document=compared, before=before, after=after)
+
+
+def test_where_the_last_run_tells_no_error_the_points_still_stand(tmp_path):
+    parts = archive(tmp_path)
+    last = "20241201-081500-simulated-002abc"
+    spoilt = result_of(last, MACHINE, curve=CURVE)
+    for value in spoilt["parameters"].values():
+        value["std"] = None
+    make_run(tmp_path, last, result=spoilt, origin={"motor": "pump"})
+    document = trend_of(parts, "pump")
+    assert [point["run"] for point in document["points"]] == [COLD, WARM, last] and document["changes"] == {}
+    said = rendered("shelves/trend.html", "en", document=document, motor="pump")
+    assert "3.716</td>" in said and "3.716 ± 0.009</td>" in said and "σ)" not in said
+
+
+@pytest.mark.parametrize(("language", "verdict", "change"), [
+    ("en", "The same motor, changed:", "rotor resistance +10.0 % ("), ("de", "Derselbe Motor, verändert:", "Läuferwiderstand +10,0 % ("),
+])  # fmt: skip
+def test_the_page_of_two_runs_says_one_thing_of_each_parameter_in_the_readers_language(
+    tmp_path, language, verdict, change
+):
+    said = page(archive(tmp_path, 1.1), language)
+    assert verdict in said and change in said
+    assert "+20" not in said  # the difference as measured, which is mostly the winding's warmth
+    assert "45 °C" in said and "20 °C" in said
+    assert 'lang="en"' not in said or language == "en"
+
+
+def test_every_verdict_of_a_comparison_has_its_words():
+    source, _, _ = environment().loader.get_source(environment(), "shelves/compare.html")
+    assert all(f'"{one}": _(' in source for one in map(plain, Identity))
