@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES, SHAPES
-from commissioner.estimation.record import SMOOTH_S, Record, between, first_part, smoothed
+from commissioner.estimation.record import SMOOTH_S, Record, Window, between, first_part, smoothed
 from commissioner.estimation.record import STATES as RECORD_STATES
 
 Array = NDArray[np.float64]
@@ -108,28 +109,36 @@ def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0
     for k, w in enumerate(record.windows):
         if not w.is_from_rest:
             first[k, 0:4] = [w.voltage[0, 1], -w.voltage[0, 0]] * 2 / np.array(record.scales.frequency_rad_per_s)
-            first[k, 8] = (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
+            driver = record.windows[
+                max(k - 1, 0)
+            ]  # whose field the shaft still turns with, whatever field this one has
+            first[k, 8] = driver.direction * (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
     return Machine(theta, first, np.zeros(times.shape), times, has_shaft).with_values(values)
 
 
 CALM_S, BUSY_S, AROUND_S = 0.15, 5e-3, 0.03
 """Between knots of an unknown load where nothing changes, and around a load step, which reaches so far."""
+MOST_BUSY = 160
+"""Knots around all changes: a load that changes all the time has them wider apart (1200 took minutes)."""
 
 
 def knot_times(record: Record) -> Array:
     """(windows, knots), denser where the current changes after the start; short rows are filled up far beyond the end."""
+    spans = [_changes(w, record.period_s) for w in record.windows]
+    apart = max(BUSY_S, sum(high - low for own in spans for low, high in own) / MOST_BUSY)
     rows = []
-    for w in record.windows:
-        end = float(w.time_s[-1])
-        times = set(np.arange(0.0, end + CALM_S, CALM_S))
-        changes = np.flatnonzero((w.state == BUSY) & (np.roll(w.state, 1) != BUSY))
-        for first in changes:
-            last = first + int(np.argmax(w.state[first:] != BUSY))
-            low, high = w.time_s[first] - AROUND_S, w.time_s[max(last, first)] + AROUND_S
-            times |= set(np.arange(max(low, 0.0), min(high, end), BUSY_S))
-        rows.append(np.array(sorted(times)))
+    for w, own in zip(record.windows, spans, strict=True):
+        calm = np.arange(0.0, float(w.time_s[-1]) + CALM_S, CALM_S)
+        rows.append(np.unique(np.concatenate([calm, *(np.arange(low, high, apart) for low, high in own)])))
     widest = max(r.size for r in rows)
     return np.array([np.concatenate([r, r[-1] + 1e3 * (1.0 + np.arange(widest - r.size))]) for r in rows])
+
+
+def _changes(w: Window, period_s: float) -> list[tuple[float, float]]:
+    """Begin and end of what is near a change, s."""
+    is_near = np.pad(maximum_filter1d(w.state == BUSY, 2 * round(AROUND_S / period_s) + 1, mode="constant"), 1)
+    begins, ends = (np.flatnonzero(np.diff(is_near.astype(int)) == sign) for sign in (1, -1))
+    return [(float(w.time_s[b]), float(w.time_s[e - 1]) + period_s) for b, e in zip(begins, ends, strict=True)]
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,10 @@ JUMP, JUMP_SIGMA, MOST_JUMPS = 0.05, 12.0, 20
 not known: the fit begins anew. More samples than so many are another kind of voltage."""
 OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
 """Of rated peak: below both the contactor is open."""
+OPEN = 0.15
+"""Of rated peak: what the other phases carry where one is open."""
+MOST_LOCKED = 10.0
+"""Locked-rotor current over the rated one, at rated voltage."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
@@ -61,6 +65,11 @@ class Window:
     def count(self) -> int:
         """Samples."""
         return int(self.time_s.size)
+
+    @property
+    def direction(self) -> float:
+        """In which the supply turns: 1 or -1."""
+        return -1.0 if _turns_backwards(self.voltage) else 1.0
 
 
 @dataclass(frozen=True)
@@ -124,14 +133,21 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         current, voltage = _currents(one), _voltages(one)
         _check(one, voltage, scales)
+        open_phases = _open_phases(one, current, scales)
+        is_open: Bools = np.asarray(open_phases.any(axis=0))
         sigmas.append([*(noise_of(current[:, k]) for k in range(3)), noise_of(voltage[:, 0]), noise_of(voltage[:, 1])])
-        if _is_crossed(current, voltage):
+        if _is_crossed(np.where(is_open[:, None], 0.0, current), voltage, scales):
             raise _refused(
                 f"{one.source}: currents and voltages turn against each other",
                 "opposite",
                 "one phase order",
                 "exchange two current channels, or two voltages, with --map",
             )
+        for phase, quiet in zip("uvw", open_phases, strict=True):
+            if quiet.any():
+                remarks.append(
+                    f"{one.source}: phase {phase} carries no current from {one.time_s[int(np.argmax(quiet))]:.3g} s on, {quiet.sum() * period:.2g} s in all, while the others do (a line, a fuse or a pole is open, or the sensor is dead): not used."
+                )
         is_backwards = _turns_backwards(voltage)
         without |= {("uwv" if is_backwards else "uvw")[k] for k in range(3) if not np.isfinite(one.currents_a[k]).any()}
         if is_backwards:
@@ -151,13 +167,13 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             remarks.append(
                 f"{one.source}: {lost} samples have no speed: the stretches used end there and begin behind it."
             )
-        windows += _windows(signed, current, voltage, plate, has_speed, scales)
+        windows += _windows(signed, current, voltage, plate, has_speed, scales, ~is_open)
     if not windows:
         raise _refused(
-            "no stretch with voltage is long enough",
+            " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
             0.0,
             f"{LEAST_S} s",
-            "record a start, load steps, or a second of steady running",
+            "record a start, load steps, or a second of steady running, with all three phases closed",
         )
     if sum(w.count for w in windows) > MOST_SAMPLES:
         most = MOST_SAMPLES // len(windows)
@@ -269,13 +285,31 @@ def _turns_against(speed: Array, voltage: Array) -> bool:
     return bool(np.nansum(_swept(voltage) * speed[1:]) < 0)
 
 
-def _is_crossed(current: Array, voltage: Array) -> bool:
-    """Whether the two turn in opposite directions where both are there."""
-    both = []
-    for x in (voltage, current):
-        v = x[:, 0] + 1j * x[:, 1]
-        both.append(np.sum(np.imag(np.conj(v[:-4:4]) * v[4::4])) / max(np.sum(np.abs(v) ** 2), 1e-30))
-    return bool(both[0] * both[1] < 0 and abs(both[1]) > 0.3 * abs(both[0]))
+def _is_crossed(current: Array, voltage: Array, scales: Scales) -> bool:
+    """Whether most of the current turns against the voltage, less what the voltage's own weaker part drives: at that part the motor is as
+    good as locked, so that an idle one's current turns backwards from a few per cent of it on."""
+    v, i = (np.nan_to_num(x[:, 0] + 1j * x[:, 1]) for x in (voltage, current))
+    turn = abs(float(np.angle(np.sum(np.conj(v[:-1]) * v[1:]))))
+    quarter = min(max(round(0.5 * np.pi / max(turn, 1e-9)), 1), v.size // 2)
+    (forward, backward), parts = _turning(v, quarter), _turning(i, quarter)
+    along, against = np.where(forward > backward, parts, parts[::-1])
+    driven = MOST_LOCKED * scales.current_a / scales.voltage_v * np.minimum(forward, backward)
+    return bool(np.sum(np.maximum(against - driven, 0.0) ** 2) > np.sum(along**2))
+
+
+def _turning(x: NDArray[np.complex128], quarter: int) -> Array:
+    """(2, n): sizes of a vector's parts that turn forward and backward, from what it is a quarter of a period later."""
+    return 0.5 * np.abs(x[:-quarter] + np.outer([-1j, 1j], x[quarter:]))
+
+
+def _open_phases(one: RunningRecording, current: Array, scales: Scales) -> Bools:
+    """(3, n): where a phase carries no current for a period while the others do, before and after it too: poles do not switch at once."""
+    a, b, zero = np.nan_to_num(current).T
+    phases = zero + np.array([a, *(-0.5 * a + s * np.sqrt(0.75) * b for s in (1.0, -1.0))])
+    half = max(round(0.5 * BLOCK_S / one.sample_period_s), 1)
+    largest = maximum_filter1d(np.abs(phases), 2 * half + 1, axis=1, mode="nearest") / scales.current_a
+    others = ~_near(largest.max(axis=0) < OPEN, 2 * half)
+    return np.array([_near(x < OFF_CURRENT, half) & others for x in largest])
 
 
 def _near(mask: Bools, by: int) -> Bools:
@@ -292,7 +326,13 @@ def _jumps(voltage: Array, scales: Scales) -> Bools:
 
 
 def _windows(
-    one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales
+    one: RunningRecording,
+    current: Array,
+    voltage: Array,
+    plate: Nameplate,
+    has_speed: bool,
+    scales: Scales,
+    is_whole: Bools,
 ) -> Iterator[Window]:
     """Stretches without gap, with voltage and current, with speed where there is one: they begin one sample after a closing and end before the poles open one by one."""
     seen = [current, voltage]
@@ -308,7 +348,7 @@ def _windows(
     on = driven & _near(flows, pole) & (raw > 1e-9 * scales.voltage_v)
     steps = np.diff(one.time_s, prepend=one.time_s[0] - one.sample_period_s)
     is_break = (steps > 1.5 * one.sample_period_s) | (steps <= 0) | (_jumps(voltage, scales) & ~_near(~flows, 3))
-    usable = on & finite
+    usable = on & finite & is_whole
     begins = np.flatnonzero(usable & (~np.roll(usable, 1) | is_break | (np.arange(usable.size) == 0)))
     for first in begins:
         after = np.flatnonzero(~usable[first:] | (is_break[first:] & (np.arange(usable.size - first) > 0)))

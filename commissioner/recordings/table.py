@@ -183,6 +183,14 @@ def to_standstill(table: Table) -> StandstillRecording:
             "a standstill recording",
             "use `commissioner monitor` for a running motor",
         )
+    if not set(needed) & set(columns):
+        raise _refuse(
+            table.source,
+            "no measurement is in this file: neither samples over time, nor test points, nor a maker's rated values",
+            ", ".join([*columns, *table.metadata][:12]) or "no column",
+            "time_s, currents and voltages; or frequency_hz, voltage_line_v, current_line_a, power_w; or rated values",
+            "give what was measured, under these names (`commissioner docs formats`); a circuit's values alone are what `identify` would find",
+        )
     _require(table, needed, "a standstill recording")
     optional = [name for name in ("current_w_a", "dc_link_v", "averaged_periods") if name in columns]
     _require_finite(table, [*needed, *optional])

@@ -56,6 +56,54 @@ def test_phases_that_turn_against_each_other_are_refused(start):
         prepare([replace(recording, currents_a=(u, w, v))], plate)
 
 
+def on_axes(x):
+    return tuple((x * np.exp(-2j * np.pi * k / 3)).real for k in range(3))
+
+
+def idle(t, backward_v, backward_a, rng):
+    """An idle motor whose supply has a backward part: at that one it is as good as locked, six times the rated current at rated voltage."""
+    turn = np.exp(100j * np.pi * t)
+    volts = on_axes(326.6 * (turn + backward_v * np.conj(turn)))
+    amperes = on_axes(11.7 * (-0.5j * turn + backward_a * np.conj(turn)))
+    columns = [tuple(x + s * rng.standard_normal(t.size) for x in y) for y, s in ((amperes, 0.03), (volts, 0.5))]
+    return RunningRecording(t, columns[0], columns[1], False, None, 2e-4, {}, "idle.csv")
+
+
+def test_an_idle_motor_on_an_unbalanced_supply_has_no_crossed_channels():
+    """Its current turns backwards from a voltage on whose backward part is a tenth of the forward one: it was told to exchange channels."""
+    t, rng = 2e-4 * np.arange(5000), np.random.default_rng(3)
+    (window,) = prepare([idle(t, 0.1, 0.6, rng)], PLATE).windows
+    assert window.count > 4900
+    with pytest.raises(DataRefused, match="turn against each other"):
+        prepare([idle(t, 0.005, 0.7, rng)], PLATE)
+
+
+def with_phase_u_open(recording, since):
+    t, (u, v, w) = recording.time_s, recording.currents_a
+    half, is_open = 0.5 * (v - w), t >= since
+    sensed = 0.03 * np.random.default_rng(5).standard_normal(t.size)
+    alone = (np.where(is_open, sensed, u), np.where(is_open, half, v), np.where(is_open, -half, w))
+    return replace(recording, currents_a=alone)
+
+
+def test_a_phase_that_opens_ends_what_is_used_and_is_named(start):
+    recording, plate = start
+    since = recording.time_s[0] + 1.2
+    record = prepare([with_phase_u_open(recording, since)], plate)
+    assert any("phase u carries no current from 1.2 s on" in r for r in record.remarks)
+    assert len(record.windows) == 1 and record.windows[0].time_s[-1] < 1.2
+
+
+def test_a_phase_that_is_open_throughout_is_what_a_refusal_names(start):
+    recording, plate = start
+    with pytest.raises(DataRefused, match="phase u carries no current"):
+        prepare([with_phase_u_open(recording, -np.inf)], plate)
+
+
+def test_no_phase_of_a_sound_recording_is_called_open(start):
+    assert not any("carries no current" in r for r in prepare([start[0]], start[1]).remarks)
+
+
 def test_both_turning_backwards_is_said_and_used(start):
     recording, plate = start
     (a, b, c), (u, v, w) = recording.currents_a, recording.voltages_v

@@ -348,3 +348,12 @@ def test_probes_that_the_file_names_are_said_and_not_applied(tmp_path: Path) -> 
     np.testing.assert_allclose(table.columns["voltage_u_v"], V[0], atol=1e-4)
     path.write_text(lines("Probe Attenuation,1,1,1,1,1,1", f"Time (s),{ABC}") + rows(TIME, NAMED))
     assert not any(note.code == "probes" for note in understand(path)[0].notes)
+
+
+def test_a_file_of_circuit_values_alone_is_told_what_it_lacks(tmp_path):
+    """It was asked for the columns of a standstill test, time_s first."""
+    path = tmp_path / "circuit.csv"
+    path.write_text("name,value\nR_s,1.32\nR_r,1.02\nL_m,0.168\n")
+    with pytest.raises(DataRefused, match="no measurement is in this file") as refused:
+        to_standstill(contract_table(path))
+    assert "docs formats" in refused.value.remedy
