@@ -18,6 +18,7 @@ from commissioner.estimation.fit import (
     Fit,
     Machine,
     Problem,
+    jacobian,
     problem_of,
     refine,
     simulate,
@@ -38,12 +39,14 @@ Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
 """Between speeds that count as independent: the span over which they were smoothed."""
 AFTER_START_S = 0.15
-SPEED_LAG = Column("p", AT["speed_lag"])
+INERTIA, SPEED_LAG = Column("p", AT["inertia"]), Column("p", AT["speed_lag"])
 """Every column of speed may be late: a counting interval, a filter."""
 PARTS = 10
 """Of the run-up: left out one by one they show how far the inertia depends on each (jackknife: what is left is no white noise)."""
 MOST_LEFT_OF_SPEED, MOST_STD_OF_INERTIA = 0.002, 0.25
 """Of synchronous speed, rms over the parts, what friction, linear and fan load may leave of a run-up; of the inertia. Beyond, it is not given."""
+OF_ASSUMED_INERTIA = 3.0
+"""Standard deviation of the assumed inertia over the true one, less 1, where neither a start nor the plate tells it: 4 of a bare shaft."""
 LEAST_LAG_S, SURE = 3e-4, 5.0
 """A lag of the speed that is said, and its size in standard deviations."""
 LEAST_OVER_NOISE = 0.3
@@ -144,7 +147,16 @@ def _covariance(problem: Problem, fit: Fit) -> Array:
     sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
     scatter = np.sum((covariance / fit.scale @ sums) ** 2, axis=1)
     wider = np.sqrt(np.maximum(scatter / np.maximum(covariance.diagonal(), 1e-300), 1.0))
-    return np.asarray(covariance * np.outer(wider, wider))
+    aside = _by_inertia(problem, fit)
+    return np.asarray(covariance * np.outer(wider, wider) + np.outer(aside, aside))
+
+
+def _by_inertia(problem: Problem, fit: Fit) -> Array:
+    """How far an error of an inertia that is assumed, not fitted, draws the columns' numbers aside."""
+    if not fit.machine.has_shaft or INERTIA in fit.columns or problem.record.plate.inertia_kg_m2 is not None:
+        return np.zeros(len(fit.columns))
+    along = jacobian(problem, fit.machine, (INERTIA,))[0]
+    return np.asarray(OF_ASSUMED_INERTIA * fit.covariance() / fit.scale @ (fit.jacobian @ along))
 
 
 def _of_four(fit: Fit, covariance: Array) -> Array:

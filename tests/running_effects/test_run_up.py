@@ -54,3 +54,16 @@ def test_an_inertia_that_the_run_up_does_not_show_is_withheld_and_said() -> None
     found = identify([replace(recording, speed_rad_per_s=swung)], PLATE)
     assert found.inertia is None
     assert any("inertia is not given" in remark for remark in found.remarks)
+
+
+def test_an_inertia_that_nothing_tells_widens_what_it_draws_aside() -> None:
+    """Neither start nor speed, a pulsating load: by an assumed inertia L_sigma was many of its stated errors off."""
+    whole = started(PLATE, has_shaft=True, inertia=0.008, load_constant=0.4, load_ripple_cos=0.3)
+    late = slice(4000, None)
+    running = replace(
+        whole, time_s=whole.time_s[late], speed_rad_per_s=None, currents_a=tuple(x[late] for x in whole.currents_a),
+        voltages_v=tuple(x[late] for x in whole.voltages_v),
+    )  # fmt: skip
+    found = identify([running], PLATE)
+    assert found.inertia is None
+    assert max(_errors(found)) < COVERED
