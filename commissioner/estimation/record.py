@@ -292,7 +292,9 @@ def _is_crossed(current: Array, voltage: Array, scales: Scales) -> bool:
     turn = abs(float(np.angle(np.sum(np.conj(v[:-1]) * v[1:]))))
     quarter = min(max(round(0.5 * np.pi / max(turn, 1e-9)), 1), v.size // 2)
     (forward, backward), parts = _turning(v, quarter), _turning(i, quarter)
-    along, against = np.where(forward > backward, parts, parts[::-1])
+    along, against = np.where(forward > backward, parts, parts[::-1]) * (
+        forward + backward > OFF_VOLTAGE * scales.voltage_v
+    )
     driven = MOST_LOCKED * scales.current_a / scales.voltage_v * np.minimum(forward, backward)
     return bool(np.sum(np.maximum(against - driven, 0.0) ** 2) > np.sum(along**2))
 

@@ -106,8 +106,8 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     if are_sheets(tables):
         return _points(tables, request)
     require_whole_sheets(tables)
-    require_independent(tables)
     if any(t.is_running for t in tables):
+        require_independent(tables)
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(document, request.out, running=running)
     return _recordings(tables, request, observe, go_on)
