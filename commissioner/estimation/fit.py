@@ -109,10 +109,8 @@ def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0
     for k, w in enumerate(record.windows):
         if not w.is_from_rest:
             first[k, 0:4] = [w.voltage[0, 1], -w.voltage[0, 0]] * 2 / np.array(record.scales.frequency_rad_per_s)
-            driver = record.windows[
-                max(k - 1, 0)
-            ]  # whose field the shaft still turns with, whatever field this one has
-            first[k, 8] = driver.direction * (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
+            before = record.windows[max(k - 1, 0)]  # the shaft still turns with its field
+            first[k, 8] = before.direction * (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
     return Machine(theta, first, np.zeros(times.shape), times, has_shaft).with_values(values)
 
 

@@ -24,9 +24,15 @@ from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.operations.events import GoOn, Observe, always, nobody
-from commissioner.operations.ranges import require_distinct, require_independent
+from commissioner.operations.ranges import require_distinct
 from commissioner.operations.recordings import catalogue
-from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
+from commissioner.operations.recordings.intake import (
+    plate_metadata,
+    require_independent,
+    require_one_motor,
+    standstill,
+    without_copies,
+)
 from commissioner.operations.recordings.running import diagnosed
 from commissioner.operations.recordings.sheets import (
     are_sheets,

@@ -27,7 +27,8 @@ from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.plate_match import contradiction, doubt, rated_point, sure_mismatch
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.ranges import require_distinct, require_independent
+from commissioner.operations.ranges import require_distinct
+from commissioner.operations.recordings.intake import require_independent
 from commissioner.operations.recordings.trust import (
     Trust,
     refused,

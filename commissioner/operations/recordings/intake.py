@@ -7,12 +7,17 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.table import Table, to_standstill
 from commissioner.records import StandstillRecording
 from commissioner.settings import load_motor
 
+IN_A_ROW, MOST_SHARED = 32, 0.5
+"""Samples of the currents that are alike in a row only in copies; the part of the shorter recording that may be."""
+ODD = np.uint64(0x9E3779B97F4A7C15)
+"""Spreads the bits of a sample over its word: 2^64 over the golden ratio."""
 STANDSTILL_COLUMNS = frozenset(
     ["time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v"]
 )
@@ -53,6 +58,37 @@ def without_copies(recordings: Sequence[StandstillRecording]) -> tuple[list[Stan
 
 def _holds_the_same(one: StandstillRecording, other: StandstillRecording) -> bool:
     return np.array_equal(one.current_u_a, other.current_u_a) and np.array_equal(one.time_s, other.time_s)
+
+
+def require_independent(tables: Sequence[Table]) -> None:
+    """DataRefused where most of a recording stands in another one too: a copy or an excerpt under another name is no second measurement."""
+    known: list[tuple[str, NDArray[np.uint64]]] = []
+    for table in tables if len(tables) > 1 else ():
+        own = _rows(table)
+        for source, theirs in known:
+            shared = np.intersect1d(own, theirs, assume_unique=True).size / max(min(own.size, theirs.size), 1)
+            if shared > MOST_SHARED:
+                raise DataRefused(
+                    f"{table.source} holds the same measured samples as {source}", step="read recordings", value=f"{100 * shared:.0f} % of the samples",
+                    limit="every measurement once: a copy would narrow the errors and measure nothing", remedy="leave one of the two out",
+                )  # fmt: skip
+        known.append((table.source, own))
+
+
+def _rows(table: Table) -> NDArray[np.uint64]:
+    """A number for every row of `IN_A_ROW` samples of the currents in which one flows, each once."""
+    currents = [np.nan_to_num(x) for name, x in sorted(table.columns.items()) if name.startswith("current_")]
+    if not currents or currents[0].size < IN_A_ROW:
+        return np.zeros(0, np.uint64)
+    out, flows = np.zeros(currents[0].size, np.uint64), np.zeros(currents[0].size, bool)
+    for x in currents:
+        out = (out * ODD) ^ np.ascontiguousarray(x + 0.0).view(np.uint64)
+        flows |= x != 0.0
+    reach = 1
+    while reach < IN_A_ROW:
+        out ^= out >> np.uint64(29)
+        out, reach = out[:-reach] * ODD + out[reach:], 2 * reach
+    return np.unique(out[flows[: out.size]])
 
 
 def require_one_motor(recordings: Sequence[StandstillRecording]) -> None:

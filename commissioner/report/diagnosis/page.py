@@ -34,16 +34,8 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
             sections.parameters(document),
             evidence.for_experts(document, left, has, alike),
         ]
-    parts.append(
-        Section(
-            "The data",
-            *(
-                map(capitalised, document["audit"])
-                if document["audit"]
-                else ("Nothing unusual was found in the file.",)
-            ),
-        )
-    )
+    audit = document["audit"] or ("Nothing unusual was found in the file.",)
+    parts.append(Section("The data", *map(capitalised, audit)))
     return Page(
         title=f"Diagnosis: {name}",
         headline=headline(document),

@@ -10,9 +10,9 @@ import pytest
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import verify_runs
-from commissioner.operations.ranges import require_independent
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifyRequest, identify_any
+from commissioner.operations.recordings.intake import require_independent
 from commissioner.operations.recordings.monitor import MonitorRequest, monitor
 from commissioner.operations.recordings.simulate import SimulateRequest, simulate
 from commissioner.recordings.table import Table
