@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_COLUMNS
+from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.cells import is_number, is_numeric
 from commissioner.recordings.reading.preface import SIGNS
 from commissioner.recordings.units import is_unit, read_unit, unit_in
@@ -164,6 +165,8 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
             (beside.get("horizontal units", "s"), beside.get("vertical units", ""), *("",) * (width - 2)), tuple(preface), skip,
         )  # fmt: skip
     names, units, used, is_split = _names(above, width)
+    if not is_split:
+        _require_columns(above[len(above) - used :], rows, source)
     names, units, used = _by_keys(above, width, names, units, used)
     said = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
     return Layout(separator, lines[first].start, names, units, said, 0, is_split and separator == ",")
@@ -174,6 +177,21 @@ def _cells_above(text: str, separator: str, width: int) -> Row:
     bare = text.lstrip("\ufeff")
     ways = [_said(bare, mark) for mark in dict.fromkeys((separator, ";", "\t", ","))]
     return next((row for row in ways if len(row) == width), ways[0])
+
+
+def _require_columns(header: Sequence[Row], rows: Sequence[Row], source: str) -> None:
+    """DataRefused: channels are named beyond the last number of the rows, or numbers stand beyond the last name, so that it is
+    open which name is which column's."""
+    width = len(rows[0])
+    for names in header:
+        more, fewer = names[width:], [row[len(names) :] for row in rows]
+        is_open = any(map(meaning_of, more)) or (any(map(meaning_of, names)) and any(any(cells) for cells in fewer))
+        if is_open and not _is_units(names):
+            raise DataRefused(
+                f"{source}: its rows hold {'fewer' if more else 'more'} columns than are named", step="recognise columns",
+                value=f"{len(names)} names over {width} numbers", limit="a name for each column, in their order",
+                remedy="export the column that is missing, or name those that have no name (`column_1,time_s,...`)",
+            )  # fmt: skip
 
 
 def _beyond(header: Sequence[Row], width: int) -> list[Row]:
@@ -189,18 +207,20 @@ def _by_keys(
     labels, said = (_keyed(above, width, keys) for keys in (LABELS, UNITS))
     last = [c for c in (above[-1] if above else []) if c]
     if labels and len(last) > 2 and all(is_numeric(c) for c in last[1:]):
-        names, units, used = ("", *labels), ("",) * width, 0
+        names, units, used = labels, ("",) * width, 0
     elif labels and (not last or _key(last[0]) not in LABELS):
-        names = tuple(labels[k - 1] if k and labels[k - 1] else n for k, n in enumerate(names))
+        names = tuple(label or name for label, name in zip(labels, names, strict=True))
     if said:
-        units = tuple(said[k - 1] if k and not u else u for k, u in enumerate(units))
+        units = tuple(unit or of_key for unit, of_key in zip(units, said, strict=True))
     return names, units, used
 
 
 def _keyed(above: Sequence[Row], width: int, keys: frozenset[str]) -> tuple[str, ...]:
-    """The cells behind the key of the last such row that has one for every column but the first."""
+    """The cells behind the key of the last such row, one a column: nothing for the first, which stands below the key, unless the
+    row names one channel more."""
     for row in reversed(above):
-        cells = [*row[1:], *[""] * (width - len(row))][: width - 1]
+        is_before = len(row) == width + 1 and row[-1]
+        cells = [*([] if is_before else [""]), *row[1:], *[""] * width][:width]
         if row and _key(row[0]) in keys and len(row) >= width - 1 and any(cells) and not any(":" in c for c in cells):
             return tuple(cells)
     return ()

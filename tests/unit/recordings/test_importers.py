@@ -191,3 +191,26 @@ def test_units_in_the_names_count_in_a_plain_comma_csv_too(tmp_path: Path) -> No
     assert recording.sample_period_s == pytest.approx(1.25e-4)
     np.testing.assert_allclose(recording.currents_a[0], CHANNELS[0], atol=1e-6)
     np.testing.assert_allclose(recording.voltages_v[0], 400 * CHANNELS[0], atol=1e-4)
+
+
+@pytest.mark.parametrize("header", ["index,time_s,ia,ib,ic,va,vb,vc", "ia,ib,ic,va,vb,vc"])
+def test_names_and_columns_that_do_not_count_alike_are_refused(tmp_path: Path, header: str) -> None:
+    """Read from the left every channel would be its neighbour's."""
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([f"# sample_period_s: 1\n{header}", *(f"{k},1,2,3,4,5,6" for k in range(20))]))
+    with pytest.raises(DataRefused, match="columns than are named") as refused:
+        read_running(path)
+    assert refused.value.value == f"{header.count(',') + 1} names over 7 numbers"
+
+
+@pytest.mark.parametrize("first", ["", ","])
+def test_a_row_of_labels_names_the_columns_whether_a_cell_stands_below_its_key_or_not(
+    tmp_path: Path, first: str
+) -> None:
+    path = tmp_path / "trace.csv"
+    head = '"TraceName","Ia","Ib","Ic","Uab","Ubc","Uca"\n"VUnit","mA","mA","mA","V","V","V"\n"SampleRate",8000,8000,8000,8000,8000,8000\n"HUnit","s","s","s","s","s","s"\n\n'
+    rows = [first + ",".join(f"{1e3 * c[k]:.7f}" for c in (*CHANNELS, *CHANNELS)) for k in range(len(TIME))]
+    path.write_text(head + "\n".join(rows))
+    recording = read_running(path)
+    np.testing.assert_allclose(recording.currents_a[0], CHANNELS[0], atol=1e-6)
+    np.testing.assert_allclose(recording.currents_a[1], CHANNELS[1], atol=1e-6)
