@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ def drive_words(drive_type: str, serial_number: int | None) -> str:
 
 
 Signal = NDArray[np.float64]
+DiagnosisVerdict = Literal["explained", "nothing_significant", "not_distinguishable", "unexplained", "refused"]
+"""What a diagnosis ends with, of a motor at rest or running, of samples or of test points."""
 
 
 def peak(signal: Signal) -> float:

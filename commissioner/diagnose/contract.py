@@ -11,6 +11,7 @@ from commissioner.encoding import Json
 from commissioner.errors import ErrorDocument
 from commissioner.identify.contract import SheetValue, Silence, StatedValue
 from commissioner.motor.nameplate import Plate
+from commissioner.records import DiagnosisVerdict
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
 
@@ -126,7 +127,7 @@ class DiagnosisDocument(TypedDict):
     manufacturer's sheet, as in the identification of one.
     """
 
-    verdict: str
+    verdict: DiagnosisVerdict
     reason: str
     error: NotRequired[ErrorDocument]
     kind: str

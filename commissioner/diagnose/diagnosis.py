@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from functools import partial
 
 import numpy as np
@@ -36,7 +35,7 @@ from commissioner.diagnose.verdict.experiment import next_experiment
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import PARAMETERS, Quantity
-from commissioner.records import StandstillRecording
+from commissioner.records import DiagnosisVerdict, StandstillRecording
 
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
@@ -47,19 +46,11 @@ NEVER_NAMEABLE = (
 )
 
 
-class Verdict(Enum):
-    EXPLAINED = "explained"
-    NOTHING_SIGNIFICANT = "nothing_significant"
-    NOT_DISTINGUISHABLE = "not_distinguishable"
-    UNEXPLAINED = "unexplained"
-    REFUSED = "refused"
-
-
 @dataclass(frozen=True)
 class Diagnosis:
     """Everything the report shows. `found` is None where the data were refused."""
 
-    verdict: Verdict
+    verdict: DiagnosisVerdict
     reason: str
     causes: tuple[Cause, ...]
     below_materiality: tuple[str, ...]
@@ -131,14 +122,14 @@ def diagnose(
 
 
 def _refused(refusal: DataRefused, audit: Audit, noise: Noise | None = None) -> Diagnosis:
-    return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", (), (), audit, noise, refusal=refusal)
+    return Diagnosis("refused", f"{refusal.what}; {refusal.remedy}", (), (), audit, noise, refusal=refusal)
 
 
 def _unfinished(steps: Sequence[Step], audit: Audit, noise: Noise) -> Diagnosis:
     """Given up: what the search had accepted was not weighed against what else makes the same error, so that it is no name yet."""
     so_far = ", ".join(replayed(steps).accepted)
     return Diagnosis(
-        Verdict.UNEXPLAINED,
+        "unexplained",
         "Not finished: the time allowed was over before every cause was tried and weighed.",
         (),
         (),
@@ -178,7 +169,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     verdict, reason = _verdict(
         causes, lack, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
     )
-    experiment = next_experiment(verdict.value, causes, record)
+    experiment = next_experiment(verdict, causes, record)
     return Diagnosis(
         verdict,
         reason,
@@ -202,7 +193,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
 
 def _verdict(
     causes: Sequence[Cause], lack: LackOfFit, share: float, *, leaves_a_trace: bool, found: Found
-) -> tuple[Verdict, str]:
+) -> tuple[DiagnosisVerdict, str]:
     fitted = any(not c.from_audit for c in causes)
     if (
         lack.sigma > RULES.unexplained_sigma
@@ -220,20 +211,23 @@ def _verdict(
             if found.ruled_out.chi2
             else ""
         )
-        return Verdict.UNEXPLAINED, (
+        return "unexplained", (
             f"A structured error of {lack.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{ruled_out}{seen}"
         )
     if not causes:
-        return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."
+        return (
+            "nothing_significant",
+            "The four-parameter model reproduces the recording to within its noise.",
+        )
     tied = [c for c in causes if c.equivalent]
     if tied:
         classes = "; ".join(" or ".join((c.name, *c.equivalent)) for c in tied)
-        return Verdict.NOT_DISTINGUISHABLE, f"These data cannot tell apart: {classes}."
+        return "not_distinguishable", f"These data cannot tell apart: {classes}."
     if lack.sigma > 0.0:
-        return Verdict.EXPLAINED, (
+        return "explained", (
             f"The named causes leave {lack.sigma:.2g} times the noise, {1.0 - share:.1%} of the error power that there was to explain."
         )
-    return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
+    return "explained", "The named causes leave nothing above the noise."
 
 
 def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:

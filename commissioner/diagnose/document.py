@@ -23,7 +23,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
     """Document of a recording's diagnosis."""
     held, noise, left = seen.held_out, seen.noise, seen.left
     document: DiagnosisDocument = {
-        "verdict": seen.verdict.value,
+        "verdict": seen.verdict,
         "reason": seen.reason,
         "kind": "recording",
         "convention": f"{CONVENTION}; {OF_RECORDINGS}",

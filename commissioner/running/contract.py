@@ -31,7 +31,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
     """Plain JSON types."""
     gain, left, found, record = seen.gain, seen.left, seen.found, seen.record
     document: DiagnosisDocument = {
-        "verdict": seen.verdict.value,
+        "verdict": seen.verdict,
         "reason": seen.reason,
         "kind": "recording",
         "test": "running",

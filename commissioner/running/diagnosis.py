@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from commissioner.estimation.numbers import AT, FOUR, NAMES
 from commissioner.estimation.record import Record, prepare
 from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
-from commissioner.records import RunningRecording
+from commissioner.records import DiagnosisVerdict, RunningRecording
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.lack import Lack, lack_of_fit, rms_errors
@@ -32,14 +31,6 @@ MOSTLY_GUESSES = 0.8
 """Share of the error below which causes beside something unexplained are not named: whatever bends helps a fit a little."""
 LEAST_ERROR = 0.1
 """Power of the held-out error over the noise's, below which there is nothing to gain there."""
-
-
-class Verdict(Enum):
-    EXPLAINED = "explained"
-    NOTHING_SIGNIFICANT = "nothing_significant"
-    NOT_DISTINGUISHABLE = "not_distinguishable"
-    UNEXPLAINED = "unexplained"
-    REFUSED = "refused"
 
 
 @dataclass(frozen=True)
@@ -72,7 +63,7 @@ class Gain:
 class Diagnosis:
     """Everything the report shows. `found` is None where the data were refused."""
 
-    verdict: Verdict
+    verdict: DiagnosisVerdict
     reason: str
     causes: tuple[NamedCause, ...] = ()
     gain: Gain | None = None
@@ -112,7 +103,7 @@ def diagnose(
             go_on=go_on,
         )
     except DataRefused as refusal:
-        return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", refusal=refusal)
+        return Diagnosis("refused", f"{refusal.what}; {refusal.remedy}", refusal=refusal)
     return _conclude(record, found)
 
 
@@ -122,7 +113,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain)
     remarks = list(record.remarks)
-    if verdict is Verdict.UNEXPLAINED and causes and gain.explained_share < MOSTLY_GUESSES:
+    if verdict == "unexplained" and causes and gain.explained_share < MOSTLY_GUESSES:
         guesses = ", ".join(c.name.replace("_", " ") for c in causes)
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")
         causes = ()
@@ -142,7 +133,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         )
     return Diagnosis(
         verdict, reason, causes, gain, left, _parameters(found.nominal), _parameters(found.fit),
-        next_experiment(verdict.value, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
+        next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
     )  # fmt: skip
 
 
@@ -203,7 +194,7 @@ def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
     }
 
 
-def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Verdict, str]:
+def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[DiagnosisVerdict, str]:
     is_off = left.sigma > UNEXPLAINED_SIGMA and (not causes or gain.explained_share < LEAST_SHARE)
     in_bursts = left.burst_sigma > BURST_SIGMA and (not causes or gain.explained_share < BURST_SHARE)
     if is_off or in_bursts or left.sigma > FAR_OFF_SIGMA:
@@ -215,23 +206,26 @@ def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Verd
         where = f" Most of it lies at {left.burst_at_s:.2f} s." if left.burst_sigma > 2.0 * max(left.sigma, 0.1) else ""
         size = max(left.sigma, left.burst_sigma if in_bursts else 0.0)
         return (
-            Verdict.UNEXPLAINED,
+            "unexplained",
             f"A structured error of {size:.2g} times the noise remains that no cause in the catalogue makes.{where}{names}",
         )
     if not causes:
-        return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."
+        return (
+            "nothing_significant",
+            "The four-parameter model reproduces the recording to within its noise.",
+        )
     tied = [c for c in causes if c.equivalent]
     if tied:
         return (
-            Verdict.NOT_DISTINGUISHABLE,
+            "not_distinguishable",
             f"These data cannot tell apart: {'; '.join(' or '.join((c.name, *c.equivalent)) for c in tied)}.",
         )
     if left.sigma > 0.0:
         return (
-            Verdict.EXPLAINED,
+            "explained",
             f"The named causes leave {left.sigma:.2g} times the noise, {1.0 - gain.explained_share:.1%} of the error power that there was to explain.",
         )
-    return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
+    return "explained", "The named causes leave nothing above the noise."
 
 
 def _parameters(fit: Fit) -> dict[str, Quantity]:

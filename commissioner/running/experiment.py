@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from commissioner.estimation.record import Record
+from commissioner.records import DiagnosisVerdict
 from commissioner.running.causes import CATALOGUE, confounders_of
 
 START = "Record from before the contactor closes to one second after the motor runs, 5000 samples a second or more, all currents and voltages and the speed."
@@ -24,7 +25,9 @@ class Experiment:
     command: str = "commissioner diagnose recording.csv --out diagnosis"
 
 
-def next_experiment(verdict: str, causes: Sequence[tuple[str, Sequence[str]]], record: Record) -> Experiment | None:
+def next_experiment(
+    verdict: DiagnosisVerdict, causes: Sequence[tuple[str, Sequence[str]]], record: Record
+) -> Experiment | None:
     """Of the first tie; of what is unexplained; None where nothing is open."""
     for name, equivalent in causes:
         if equivalent:

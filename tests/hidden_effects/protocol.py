@@ -55,7 +55,7 @@ def _diagnosed(row: Row, case: Case, recording: Any) -> Any:
     start = time.perf_counter()
     seen = diagnose([recording], excluded=case.excluded)
     row["seconds"] = time.perf_counter() - start
-    row["verdict"], row["reason"] = seen.verdict.value, seen.reason
+    row["verdict"], row["reason"] = seen.verdict, seen.reason
     row["left_sigma"] = seen.left.sigma if seen.left else None
     row["held_out"] = seen.held_out.share if seen.held_out else None
     row["causes"], row["unsure"] = ([_claim(c) for c in some] for some in (seen.causes, seen.unsure))

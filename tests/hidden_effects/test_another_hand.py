@@ -40,7 +40,7 @@ def long(*values):
 def test_a_machine_without_a_fault_has_none(named, tones_hz):
     """A single slow tone's reactance is the magnetizing inductance for the most part: the leakage lies far below it."""
     seen, names = named(Machine(tones_hz=tones_hz))
-    assert seen.verdict.value == "nothing_significant" and not names
+    assert seen.verdict == "nothing_significant" and not names
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_gain_error_before_the_computed_third_current_is_named_and_no_noise_is
     made = recorded(Machine(gains=(0.98, 1.0, 1.0)), 1.0)
     u, v = np.round(made.current_u_a, 5), np.round(made.current_v_a, 5)
     seen = diagnose([without_computed_third(replace(made, current_u_a=u, current_v_a=v, current_w_a=-(u + v)))])
-    assert [c.name for c in seen.causes] == ["sensor_gain_mismatch"] and seen.verdict.value == "explained"
+    assert [c.name for c in seen.causes] == ["sensor_gain_mismatch"] and seen.verdict == "explained"
     assert seen.causes[0].sizes["gain_v_over_u"][0] == pytest.approx(1.0 / 0.98 - 1.0, rel=0.03)
     assert seen.held_out.noise_a == pytest.approx(seen.held_out.rmse_after_a, rel=0.02)
     found, loud = seen.found, replace(seen.noise, sigma_a=3.0 * seen.noise.sigma_a, is_known=False)
@@ -138,7 +138,7 @@ def test_a_link_that_something_else_moves_is_named_where_it_was_recorded(named):
     """Without its trace the error has no name; with it the trace says how much of it reaches the motor."""
     about = {"ripple": 0.01, "ripple_hz": 7.3}
     seen, names = named(Machine(**about))
-    assert not names and seen.verdict.value == "unexplained"
+    assert not names and seen.verdict == "unexplained"
     seen, names = named(Machine(records_link=True, **about))
     assert set(names) == {"dc_link_sag"} and seen.left.sigma < 0.1
     assert seen.causes[0].sizes["of_the_recorded_swing"][0] == pytest.approx(1.0, rel=0.01)

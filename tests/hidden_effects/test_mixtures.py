@@ -15,7 +15,7 @@ def test_nothing_is_found_where_nothing_is_hidden(noise, excitation):
     seen, scenario = diagnosed(Case("null", 50, "", excitation, noise), is_short=excitation == "rich")
     assert hidden_names(scenario) == set()
     assert seen.causes == (), seen.reason
-    assert seen.verdict.value == "nothing_significant"
+    assert seen.verdict == "nothing_significant"
 
 
 @pytest.mark.parametrize(
@@ -68,13 +68,13 @@ def test_a_weak_conductance_is_no_clock_that_stands_still(seed):
 def test_coarse_steps_that_cut_off_are_named(seed):
     """Zero lies at the edge of a step there: the error at rest had counted as unexplained."""
     seen, _ = diagnosed(Case("one", seed, "quantization"), 3.0)
-    assert [c.name for c in seen.causes] == ["quantization"] and seen.verdict.value == "explained"
+    assert [c.name for c in seen.causes] == ["quantization"] and seen.verdict == "explained"
 
 
 def test_flux_that_bent_iron_leaves_to_the_next_segment_is_no_remanence():
     """It decays by the iron's own curve; a straight one's share for all segments left 3.4 times the noise, named remanence, 1.0 sure."""
     seen, _ = diagnosed(Case("one", 2800147, "magnetizing_saturation"), 2.5)
-    assert [c.name for c in seen.causes] == ["magnetizing_saturation"] and seen.verdict.value == "explained"
+    assert [c.name for c in seen.causes] == ["magnetizing_saturation"] and seen.verdict == "explained"
     assert seen.causes[0].gain_share == 1.0
 
 
@@ -95,7 +95,7 @@ def test_a_weak_dead_time_takes_nothing_of_r_s(seed):
 def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
     seen, scenario = diagnosed(Case("absent", seed, noise="white"))
     assert hidden_names(scenario) == set() and scenario.document["unlisted"]
-    assert seen.verdict.value == "unexplained", seen.reason
+    assert seen.verdict == "unexplained", seen.reason
 
 
 def test_phases_of_unequal_resistance_do_not_bend_a_dead_time_late():
@@ -103,13 +103,13 @@ def test_phases_of_unequal_resistance_do_not_bend_a_dead_time_late():
     six small causes stood in its place, and nothing was named."""
     seen, _ = diagnosed(Case("four", 3100004), 1.0)
     assert {"sampling_delay", "dead_time", "resistance_anisotropy"} <= {c.name for c in seen.causes}
-    assert seen.verdict.value == "not_distinguishable" and seen.left.sigma < 0.05
+    assert seen.verdict == "not_distinguishable" and seen.left.sigma < 0.05
 
 
 def test_what_the_recorded_link_rules_out_is_somebody_elses():
     """An unknown cause that a sag of the link would imitate best: many weak causes had been fitted in its place."""
     seen, _ = diagnosed(Case("absent", 3000012), 1.0)
-    assert seen.verdict.value == "unexplained" and seen.left.from_ruled_out_sigma > 0.03
+    assert seen.verdict == "unexplained" and seen.left.from_ruled_out_sigma > 0.03
     assert "looks like dc_link_sag, which the recorded DC link rules out" in seen.reason
     assert len(seen.found.accepted) <= 2
 
@@ -118,17 +118,17 @@ def test_what_the_recorded_link_rules_out_is_somebody_elses():
 def test_no_cause_gains_more_than_all_together():
     """A course of speed that had run far promised ten times the whole error, and was named for it beside an unknown cause."""
     seen, _ = diagnosed(Case("absent", 2500012), 3.0)
-    assert seen.verdict.value == "unexplained" and not seen.causes
+    assert seen.verdict == "unexplained" and not seen.causes
 
 
 def test_a_forbidden_cause_is_not_replaced_by_a_wrong_name_that_explains_everything(is_short):
     case = Case("absent", 61, "sensor_gain_mismatch", noise="white", excluded=("sensor_gain_mismatch",))
-    assert diagnosed(case, is_short=is_short)[0].verdict.value == "unexplained"
+    assert diagnosed(case, is_short=is_short)[0].verdict == "unexplained"
 
 
 def test_a_loss_of_leg_voltage_is_a_tie_with_the_experiment_that_splits_it(is_short):
     seen, _ = diagnosed(Case("one", 70, "device_drop", noise="white"), is_short=is_short)
-    assert seen.verdict.value == "not_distinguishable"
+    assert seen.verdict == "not_distinguishable"
     assert {"dead_time", "device_drop"} == {seen.causes[0].name, *seen.causes[0].equivalent}
     assert "switching frequency" in seen.next_experiment["do"] and seen.next_experiment["predicted_sigma"] >= 10.0
 

@@ -13,7 +13,7 @@ def named(drive):
 
 def test_ideal_pulses_are_their_averages():
     seen, names = named(Drive())
-    assert seen.verdict.value == "nothing_significant" and not names, seen.reason
+    assert seen.verdict == "nothing_significant" and not names, seen.reason
 
 
 @pytest.mark.parametrize("lag_us", [12.0, 40.0])
@@ -40,5 +40,5 @@ def test_a_real_dead_time_is_named_though_what_ripple_makes_of_it_is_left():
     seen, names = named(Drive(dead_s=2e-6))
     assert names == {"dead_time"} and seen.causes[0].confidence >= 0.9
     assert seen.left.sigma < 0.1 * seen.causes[0].strength_sigma
-    if seen.verdict.value == "unexplained":
+    if seen.verdict == "unexplained":
         assert "consistent with dead_time" in seen.reason

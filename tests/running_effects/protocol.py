@@ -127,7 +127,7 @@ def _error_power(seen: Diagnosis, machine: Machine, other: RunningRecording, pla
 def _said(seen: Diagnosis) -> Row:
     fit = seen.found.fit if seen.found else None
     return {
-        "verdict": seen.verdict.value,
+        "verdict": seen.verdict,
         "reason": seen.reason,
         "chi2": fit.chi2 / fit.count if fit else None,
         "left": seen.left.sigma if seen.left else None,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from commissioner.running.diagnosis import Verdict, diagnose
+from commissioner.running.diagnosis import diagnose
 from sim.motoring.machine import Effect
 from tests.running_effects.cases import Case, taken
 from tests.running_effects.start import PLATE, started
@@ -24,7 +24,7 @@ def test_with_a_leakage_that_saturates_both_are_named():
     """Alone the leakage makes the part that was held out worse, for want of the other."""
     seen = diagnose([started(PLATE, leakage_softness=0.25, **SATURATED)], PLATE)
     assert {c.name for c in seen.causes} == {"magnetizing_saturation", "leakage_saturation"}
-    assert seen.verdict is Verdict.EXPLAINED
+    assert seen.verdict == "explained"
 
 
 @pytest.mark.parametrize("winding", ["uv", "wu"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.running.diagnosis import Verdict, diagnose
+from commissioner.running.diagnosis import diagnose
 from tests.running_effects.cases import Case, taken
 
 GAIN = 0.98
@@ -27,7 +27,7 @@ def two_sensors(recording, computed, gain, *, is_written=True, digits=3):
 def test_a_gain_error_before_the_computed_third_current_is_named_with_its_size_and_its_pair(computed, is_written):
     recording, plate, _ = taken(Case(5000, "null").scenario(), 5000)
     seen = diagnose([two_sensors(recording, computed, GAIN, is_written=is_written)], plate)
-    assert seen.verdict in (Verdict.EXPLAINED, Verdict.NOT_DISTINGUISHABLE), seen.reason
+    assert seen.verdict in ("explained", "not_distinguishable"), seen.reason
     assert [c.name for c in seen.causes] == ["sensor_gain_mismatch"]
     name, (size, std, _) = next(iter(seen.causes[0].sizes.items()))
     first, second = COMPUTED[computed]
@@ -53,6 +53,6 @@ def test_what_one_of_three_sensors_does_to_all_parameters_is_said():
 def test_nothing_is_named_where_two_sensors_read_right():
     recording, plate, _ = taken(Case(5000, "null").scenario(), 5000)
     seen = diagnose([two_sensors(recording, "w", 1.0)], plate)
-    assert seen.verdict is Verdict.NOTHING_SIGNIFICANT
+    assert seen.verdict == "nothing_significant"
     assert not seen.causes
     assert any("no sensor" in r or "not used as a sensor" in r for r in seen.remarks)

@@ -25,6 +25,7 @@ from commissioner.diagnose.points.circuits import (
     scales,
 )
 from commissioner.motor.circuit import Quantity
+from commissioner.records import DiagnosisVerdict
 
 SIGNIFICANCE = 1e-3
 LEAST_HELD_OUT_GAIN = 0.25
@@ -57,7 +58,7 @@ class PointsDiagnosis:
     """Verdict on one table. Errors are of the predicted current, rms over points left out one at a time, A."""
 
     test: str
-    verdict: str
+    verdict: DiagnosisVerdict
     reason: str
     causes: tuple[PointCause, ...]
     rmse_before_a: float
@@ -196,7 +197,7 @@ def _beyond_instruments(missed: Mapping[str, float]) -> float:
 
 def _verdict(
     points: Points, causes: Sequence[PointCause], tested: Mapping[str, float], missed: Mapping[str, float]
-) -> tuple[str, str]:
+) -> tuple[DiagnosisVerdict, str]:
     where = f"the {'locked-rotor' if points.is_locked else 'no-load'} points"
     if _beyond_instruments(missed) > 1.0:
         errors = " and ".join(

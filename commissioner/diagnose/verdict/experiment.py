@@ -9,6 +9,7 @@ from commissioner.diagnose.causes import CATALOGUE, CONFOUNDED, TOGETHER, betwee
 from commissioner.diagnose.causes.cause import READ_BOTH, SAME, Procedure
 from commissioner.diagnose.contract import NextExperiment
 from commissioner.diagnose.intake.record import Facts, Record
+from commissioner.records import DiagnosisVerdict
 
 HALF, PLENTY_SIGMAS = 0.5, 10.0
 
@@ -18,7 +19,7 @@ def what_decides(name: str, record: Record) -> str:
     return CATALOGUE[name].what_decides(record) if name in CATALOGUE else ""
 
 
-def next_experiment(verdict: str, causes: Sequence[Any], record: Record) -> NextExperiment | None:
+def next_experiment(verdict: DiagnosisVerdict, causes: Sequence[Any], record: Record) -> NextExperiment | None:
     """The most useful next test, or None where nothing is open."""
     if verdict == "unexplained":
         how = Procedure(

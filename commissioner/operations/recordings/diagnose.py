@@ -48,10 +48,10 @@ from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, write_texts
-from commissioner.records import StandstillRecording
+from commissioner.records import DiagnosisVerdict, StandstillRecording
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
-VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
+VERDICTS: tuple[DiagnosisVerdict, ...] = ("unexplained", "explained", "nothing_significant", "refused")
 """Of several tables the first of these that one has is the verdict of all."""
 
 
@@ -128,7 +128,7 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
     is_computed = all(any(n.code == COMPUTED for n in r.notes) for r in recordings)
     phases = OWN_PHASES
-    if is_computed and (seen.verdict.value == "unexplained" or len(seen.causes) > 1):
+    if is_computed and (seen.verdict == "unexplained" or len(seen.causes) > 1):
         seen, said, phases = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
         remarks = [*said, *remarks]
     document = as_document(seen)
@@ -151,10 +151,10 @@ def _of_another_pair(
     recording its u, v and w are."""
     choices = [other_pairs(r) for r in recordings]
     best, said, phases = seen, [], OWN_PHASES
-    fewest = len(seen.causes) if seen.verdict.value == "explained" else len(CATALOGUE)
+    fewest = len(seen.causes) if seen.verdict == "explained" else len(CATALOGUE)
     for k, (name, _) in enumerate(choices[0]):
         other = analyse([c[k][1] for c in choices], excluded=excluded, report=observe, go_on=go_on)
-        if other.verdict.value == "explained" and len(other.causes) < fewest:
+        if other.verdict == "explained" and len(other.causes) < fewest:
             pair = {"u": ("v", "w"), "v": ("w", "u")}[name]
             best, fewest, phases = other, len(other.causes), "".join((*pair, name))
             said = [

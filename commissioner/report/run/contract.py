@@ -20,6 +20,7 @@ from commissioner.identify.contract import (
     RatedFlux,
     TModel,
 )
+from commissioner.records import DiagnosisVerdict
 
 
 class IdentityDocument(TypedDict):
@@ -107,7 +108,7 @@ class Moved(TypedDict):
 class ClosingDiagnosis(TypedDict):
     """Of the run's own samples; the whole of it is in `file`."""
 
-    verdict: str
+    verdict: DiagnosisVerdict
     reason: str
     causes: list[ClosingCause]
     moved: list[Moved]

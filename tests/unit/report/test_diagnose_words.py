@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.causes import CATALOGUE
-from commissioner.diagnose.diagnosis import Diagnosis, Verdict
+from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.document import as_document, refused_document
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.record import Facts
@@ -273,7 +273,7 @@ def test_a_class_in_a_list_reads_as_one_name():
 
 
 def test_the_page_of_a_refusal_has_the_reason_and_the_data():
-    seen = Diagnosis(Verdict.REFUSED, "too short for sensor_offset", (), (), Audit(()))
+    seen = Diagnosis("refused", "too short for sensor_offset", (), (), Audit(()))
     page = page_of(seen, as_document(seen), "file.csv")
     assert page.tone == "bad" and [s.title for s in page.sections] == ["What it means", "The data"]
     assert "too short for sensor offset" in page.sections[0].parts

@@ -25,7 +25,7 @@ def clock(fast_ppm, runs_on):
 @pytest.mark.parametrize(("fast_ppm", "runs_on"), [(-1.0, True), (12.0, True), (-6.0, False)])
 def test_a_clock_is_named_with_its_rate_whether_it_runs_on_or_restarts(fast_ppm, runs_on):
     seen = seen_with(clock(fast_ppm, runs_on))
-    assert [c.name for c in seen.causes] == ["clock_drift"] and seen.verdict.value == "explained"
+    assert [c.name for c in seen.causes] == ["clock_drift"] and seen.verdict == "explained"
     rate, spread, _ = seen.causes[0].sizes["drift_ppm"]
     assert abs(rate + fast_ppm) < max(4.0 * spread, 0.01 * abs(fast_ppm))
 

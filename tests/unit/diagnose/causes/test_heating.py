@@ -65,5 +65,5 @@ def test_heat_that_leaks_away_within_the_recording_is_named_with_its_first_rise(
     ratio = 1.0 + machine["leakage_inductance_h"] / machine["inductance_h"] if name == "rotor_heating" else 1.0
     document["effects"] = {name: {"size": rise, "time_constant_s": leak_s}}
     seen = diagnose([recording_of(build(document, "warm"), SEED)])
-    assert [c.name for c in seen.causes] == [name] and seen.verdict.value == "explained"
+    assert [c.name for c in seen.causes] == [name] and seen.verdict == "explained"
     assert seen.causes[0].sizes["rise_per_minute_at_rated_current"][0] == pytest.approx(rise / ratio**2, rel=0.05)

@@ -61,7 +61,7 @@ def test_samples_lost_before_the_first_one_of_a_segment_are_found(nominal, setti
     currents = np.concatenate(rows, axis=1)
     u, v, w = currents + NOISE_A * np.random.default_rng(3).standard_normal(currents.shape)
     seen = diagnose([replace(begun, current_u_a=u, current_v_a=v, current_w_a=w if phases == 3 else None)])
-    assert [c.name for c in seen.causes] == ["lost_samples"] and seen.verdict.value == "explained"
+    assert [c.name for c in seen.causes] == ["lost_samples"] and seen.verdict == "explained"
     assert [(x.segment, x.samples) for x in seen.found.losses] == [(1, 2), (3, 1)]
 
 
@@ -136,7 +136,7 @@ def test_of_samples_that_stand_out_only_those_are_lost_that_repeat_others(nomina
     assert [c.name for c in seen.causes] == ["lost_samples"] * bool(held)
     assert {(x.samples, x.way) for x in seen.found.losses} <= {(1, "held value")} and len(seen.found.losses) == held
     assert len(seen.found.spikes) > 2 and any("spikes" in remark for remark in seen.remarks)
-    assert seen.verdict.value == ("explained" if held else "nothing_significant")
+    assert seen.verdict == ("explained" if held else "nothing_significant")
 
 
 def test_a_value_held_for_long_is_lost_throughout(nominal, setting):

@@ -52,7 +52,7 @@ def test_what_no_motor_at_rest_can_answer_is_refused_by_name(plain, reason):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         seen = diagnose([REFUSED[reason](plain)])
-    assert seen.verdict.value == "refused"
+    assert seen.verdict == "refused"
     assert reason in seen.reason
 
 
@@ -106,7 +106,7 @@ def test_an_odd_recording_ends_in_a_verdict_with_finite_numbers(plain, setting, 
         seen = diagnose([ODD[kind](source)])
     assert seen.causes == ()
     assert all(np.isfinite(q.value) and np.isfinite(q.std) for q in seen.parameters_after.values())
-    assert seen.verdict.value == "nothing_significant"
+    assert seen.verdict == "nothing_significant"
 
 
 def test_a_weak_structure_around_the_tones_is_seen_and_noise_is_not(plain, setting, nominal):
@@ -130,7 +130,7 @@ def test_a_law_met_in_two_samples_of_a_thousand_is_seen_and_no_cause_is_named_fo
     steep = np.abs(slope) > np.quantile(np.abs(slope), 0.998)
     rows = [plain.current_u_a, plain.current_v_a, plain.current_w_a] - 0.06 * np.sign(slope) * steep
     seen = diagnose([replace(plain, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])
-    assert seen.verdict.value == "unexplained"
+    assert seen.verdict == "unexplained"
     assert not [c for c in seen.causes if c.confidence > 0.8]
     assert seen.left.from_states_sigma > 0.05
     assert diagnose([plain]).left.from_states_sigma == 0.0
