@@ -99,7 +99,8 @@ def _settled(part: Problem, machine: Machine, numbers: tuple[str, ...]) -> Machi
 def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
     """Speed from the shaft: inertia (from a start) and load are fitted too, first to little of the recording, then to more.
 
-    `smooth_load`: constant and fan only, as a start from rest has them. Else knots, denser around load steps.
+    `smooth_load`: torque over speed only, as a start from rest has it. Else knots beside it, denser around load steps: held as a prefix
+    left it, that torque drew R_s aside by up to 22 standard errors where the load drives or pulls a shaft at rest.
     """
     return _from_several_starts(problem, lambda four: _with_shaft_from(four, problem, smooth_load=smooth_load))
 
@@ -118,15 +119,9 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
                     FOUR if seconds < 0.05 else (*numbers, *(name for name, least in FREED_FROM_S if seconds >= least))
                 )
                 machine = _settled(problem.cut(seconds), machine, own)
-    if smooth_load:
-        numbers = (*numbers, *RUN_UP_LOAD, *LOAD_RIPPLE)
-        return refine(problem, machine, columns_of(numbers, record, machine), most=25)
-    return refine(
-        problem,
-        machine,
-        columns_of((*numbers, *LOAD_RIPPLE), record, machine, knots=True),
-        most=25,
-    )
+    law = RUN_UP_LOAD if smooth_load or record.has_start else ()
+    columns = columns_of((*numbers, *law, *LOAD_RIPPLE), record, machine, knots=not smooth_load)
+    return refine(problem, machine, columns, most=25)
 
 
 def _run_up_s(record: Record) -> float:

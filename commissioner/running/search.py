@@ -183,10 +183,11 @@ def search(
         fit, accepted = _exchanged(seeking, fit, accepted)
     fit, accepted = _backward(seeking, fit, accepted)
     gain, rivals = _judged(seeking, fit, accepted)
+    plain = unbiased(seeking.problem, seeking.base)
     return Found(
         seeking.problem,
-        unbiased(seeking.problem, seeking.base),
-        unbiased(seeking.problem, fit),
+        plain,
+        unbiased(seeking.problem, fit) if accepted else plain,
         accepted,
         gain,
         rivals,
@@ -253,7 +254,7 @@ def _tried(seeking: Search, held: Fit, fit: Fit, accepted: tuple[Named, ...]) ->
         if place >= RULES.tried and one.cause not in {t.cause.cause for t in tried if not t.why}:
             continue
         seeking.say(Step("screened", one.cause, one.form.name, gain / fit.scale))
-        if gain / fit.scale < 0.6 * RULES.least_gain:
+        if gain < least_promise(seeking.problem.record, fit.count, fit.scale):
             continue
         if any(t.explains_all and t.cause.cause != one.cause for t in tried):
             continue  # whoever explains as much is told apart as its rival; another form of the same cause is not
@@ -269,6 +270,12 @@ def least_strength(record: Record) -> float:
     if record.is_steady:
         return RULES.material_steady_sigma
     return RULES.material_sigma if record.has_speed else RULES.material_unheld_sigma
+
+
+def least_promise(record: Record, count: int, scale: float) -> float:
+    """Linear gain, in chi-square of so many samples, below which no refit would end in a name."""
+    material = least_strength(record) ** 2 * count
+    return max(RULES.promising * RULES.least_gain * scale, RULES.promising_material * material)
 
 
 def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[Named], gain: float) -> str:

@@ -8,7 +8,7 @@ import pytest
 from commissioner.estimation.record import prepare
 from commissioner.running.diagnosis import diagnose
 from commissioner.running.identification import identify
-from commissioner.running.search import least_strength
+from commissioner.running.search import least_promise, least_strength
 from tests.running_effects.cases import Case, taken, true_size
 from tests.running_effects.protocol import failures, false_names, gains_elsewhere, run, table
 
@@ -145,3 +145,6 @@ def test_a_name_needs_more_where_nothing_is_held_out():
         )
     )
     assert least_strength(start) < 0.0305 < least_strength(replace(start, has_speed=False)) < least_strength(steady)
+    fitted = 75_000
+    assert least_promise(start, fitted, 1.0) == pytest.approx(0.6 * 36.0)
+    assert 27.0 < least_promise(replace(start, has_speed=False), fitted, 1.0) < 0.2 * 0.1**2 * fitted

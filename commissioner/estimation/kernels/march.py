@@ -236,7 +236,8 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                     p[CONSTANT] + p[BREAKAWAY] * SLOW2 / (share * share + SLOW2) + p[RIPPLE] * c + p[RIPPLE + 1] * s
                 )
                 turning += p[RIPPLE + 2] * (c * c - s * s) + p[RIPPLE + 3] * 2.0 * s * c
-                load += turning * share / np.sqrt(share * share + SLOWEST2) + share * (p[LINEAR] + p[FAN] * share)
+                size = share if share.real > 0.0 else -share
+                load += turning * share / np.sqrt(share * share + SLOWEST2) + share * (p[LINEAR] + p[FAN] * size)
                 k[stage, 8] = per_inertia * (torque / torque_n - load)
             k[stage, 9] = w
         if q < n - 1:

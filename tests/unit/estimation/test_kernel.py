@@ -204,5 +204,18 @@ def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns()
     assert (shaft[:, 0] - 300.0) / 2 == pytest.approx(swing, abs=0.02 * np.abs(swing).max())
 
 
+def test_a_fan_brakes_a_shaft_that_turns_either_way():
+    """Without voltage the shaft slows down by 1 / (1 + t / tau), tau = J w_n^2 / (pole pairs T w_0), as long as no flux is left."""
+    p, count = numbers({"load_fan": 1.0, "inertia": 0.1}), 500
+    t = 0.5 * PERIOD * np.arange(2 * count - 1)
+    none, out, shaft = np.zeros((t.size, 2)), np.empty((count, 3)), np.empty((count, 2))
+    slowed = 300.0 / (1.0 + t[::2] * 2 * 26.0 * 300.0 / (0.1 * 314.16**2))
+    for way in (1.0, -1.0):
+        x = np.zeros(STATES)
+        x[8] = way * 300.0
+        march(p, SCALES.as_tuple(), x, none, none, np.zeros(2), np.zeros(t.size), PERIOD, True, out, shaft)
+        assert way * shaft[:, 0] == pytest.approx(slowed, rel=1e-6)
+
+
 if __name__ == "__main__":
     np.save(sys.argv[1], complex_marches())
