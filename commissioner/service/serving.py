@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -84,12 +85,14 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 def _open_more_files() -> None:
     """Each connection is one, and a run that cannot be followed for want of one is stopped; many systems give 256 or 1024."""
-    with suppress(ImportError, OSError, ValueError):  # Windows has no such limit
-        import resource
+    if sys.platform == "win32":  # has no such limit
+        return
+    import resource
 
-        given, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-        wanted = OPEN_FILES if most == resource.RLIM_INFINITY else min(OPEN_FILES, most)
-        if given != resource.RLIM_INFINITY and given < wanted:
+    given, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = OPEN_FILES if most == resource.RLIM_INFINITY else min(OPEN_FILES, most)
+    if given != resource.RLIM_INFINITY and given < wanted:
+        with suppress(OSError, ValueError):
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
