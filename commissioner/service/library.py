@@ -18,7 +18,7 @@ from commissioner.motor.nameplate import Nameplate, check
 from commissioner.recordings.whole import write_text
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
-from commissioner.service.problems import Refusal
+from commissioner.service.problems import Refusal, Unknown
 from commissioner.settings import CONFIG_FOLDER, MotorFile, ProcedureFile, load_motor, must_agree, read_toml
 from commissioner.validation import requirement
 
@@ -229,8 +229,8 @@ def _found(known: list[Known], identifier: str, what: str) -> Known:
     for one in known:
         if one.id == identifier:
             return one
-    raise UsageError(
-        f"there is no {what} {identifier[:60]!r}", step="choose", value=identifier[:60],
+    raise Unknown(
+        what, f"there is no {what} {identifier[:60]!r}", step="choose", value=identifier[:60],
         limit="one of: " + ", ".join(one.id for one in known), remedy=f"choose one of these, or add the {what} first",
     )  # fmt: skip
 

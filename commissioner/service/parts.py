@@ -43,6 +43,7 @@ class Parts:
     warm: WarmUp
     login_tries: Throttle = field(default_factory=lambda: Throttle(LOGIN_TRIES, LOGIN_WITHIN_S))
     stop_tries: Throttle = field(default_factory=lambda: Throttle(STOPS, STOPS_WITHIN_S))
+    logging_in: asyncio.Lock = field(default_factory=asyncio.Lock)
     checks: dict[str, CheckedDocument] = field(default_factory=dict)
     """Newest checks by drive and motor, for the page."""
     closing: asyncio.Event = field(default_factory=asyncio.Event)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -62,9 +62,19 @@ class Refusal(Exception):
         self.problem = Problem(title=title, status=status, **facts)
 
 
-def refusal_of(error: CommissionerError) -> Refusal:
-    """An error of the core as a refusal."""
+class Unknown(UsageError):
+    """There is no drive, motor or procedure of this id. `kind`: which of them, as a route's path calls it."""
+
+    def __init__(self, kind: str, what: str, **facts: Any) -> None:
+        super().__init__(what, **facts)
+        self.kind = kind
+
+
+def refusal_of(error: CommissionerError, named: Container[str] = ()) -> Refusal:
+    """An error of the core as a refusal. `named`: what the request's path names; where that is unknown, it is not found."""
     status = next((code for kind, code in _STATUS if isinstance(error, kind)), 500)
+    if isinstance(error, Unknown) and error.kind in named:
+        status = 404
     return Refusal(
         status, error.what, detail=error.what, step=error.step, value=_shown(error.value), limit=_shown(error.limit),
         remedy=error.remedy,

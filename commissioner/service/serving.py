@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import socket
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import uvicorn
@@ -15,6 +16,8 @@ from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings, bracketed, check_may_listen
 from commissioner.service.parts import make_parts
 
+OPEN_FILES = 10_000
+
 
 def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serve; `ready` is told the address once requests are answered. UsageError: it may not, or cannot, listen there, or another
@@ -24,6 +27,7 @@ def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> Non
 
 
 def _serve(settings: Settings, ready: Callable[[str], None]) -> None:
+    _open_more_files()
     parts = make_parts(settings)
     check_may_listen(settings, bool(parts.accounts.all()))
     listening = _listen(settings.host, settings.port)
@@ -77,6 +81,19 @@ def _alone_in(folder: Path) -> Iterator[None]:
         ) from None  # fmt: skip
     with held:
         yield
+
+
+def _open_more_files() -> None:
+    """Each connection is one, and a run that cannot be followed for want of one is stopped; many systems give 256 or 1024."""
+    if sys.platform == "win32":  # has no such limit
+        return
+    import resource
+
+    given, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = OPEN_FILES if most == resource.RLIM_INFINITY else min(OPEN_FILES, most)
+    if given != resource.RLIM_INFINITY and given < wanted:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def _listen(host: str, port: int) -> socket.socket:

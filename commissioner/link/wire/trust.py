@@ -149,7 +149,7 @@ class SerialTrust:
                 step="read the line",
                 value=answers,
                 limit=1,
-                remedy="a late answer, an echo or a second master; the line is brought back into step",
+                remedy="a late answer, an echo, a second master or two devices of one number; the line is brought back into step",
             )
 
     def _prove_step(self) -> None:
@@ -186,7 +186,7 @@ class SerialTrust:
             value=failure.value if failure else None,
             limit=f"a proven answer within {ATTEMPTS} attempts",
             remedy=(f"{failure.remedy}; " if failure else "")
-            + "check device number, baud rate, parity, termination, and that there is one master only",
+            + "check device number, baud rate, parity, termination, and that there is one master only and one device of this number",
         ) from failure
 
     def _fall_silent(self) -> None:

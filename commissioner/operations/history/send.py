@@ -72,12 +72,15 @@ def _one(folder: Path, service: _Service) -> Moved:
         return Moved(run, CONFLICT, 0, 0, CONFLICTING)
     if relation in (THERE, NEWER):
         return Moved(run, relation, 0, 0)
-    files, size, names = 0, 0, file_names(folder)
-    for name in names:
+    files, size, digests = 0, 0, dict[str, str]()
+    for name in file_names(folder):
         content = journal if name == JOURNAL else (folder / name).read_bytes()
+        digests[name] = hashlib.sha256(content).hexdigest()
         if sent := _send(content, f"{path}/{quote(name)}", there["begun"].get(name), service):
             files, size = files + 1, size + sent
-    done = service.ask("POST", path, json.dumps({"files": names}).encode(), "application/json")
+    done = service.ask(
+        "POST", path, json.dumps({"files": list(digests), "sha256": digests}).encode(), "application/json"
+    )
     return Moved(run, str(done["what"]), files, size, str(done["why"]))
 
 

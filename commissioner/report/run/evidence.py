@@ -27,9 +27,9 @@ MOST_TESTS = 8
 
 
 def evidence(subject: Subject) -> Markup:
-    """The second page; empty where no test was fitted."""
+    """The second page: of a run that ended before its tests were fitted what was applied; empty where nothing was."""
     if not subject.tests:
-        return Markup("")
+        return Markup("<h2>The evidence</h2>\n") + _up_to_the_end(subject) if subject.samples else Markup("")
     parts = [
         Markup("<h2>The evidence</h2>"),
         _limits_kept(subject),
@@ -51,6 +51,38 @@ def _limits_kept(subject: Subject) -> Markup:
     )
     drawn = over_time(subject, subject.trip_current_a, subject.guard.get("limit_wb"))
     return marks.figure("Limits kept", drawn, caption, aside=ABOVE_AND_BELOW)
+
+
+def _up_to_the_end(subject: Subject) -> Markup:
+    """What the motor got, and what the guard judged, where no model was fitted to it."""
+    trip, limit, peak = subject.trip_current_a, subject.guard.get("limit_wb"), subject.peak_flux_wb
+    time, current = subject.applied_a
+    panels = [("Current along the axis, A", _against(time, current, trip, "A", "Current along the axis"))]
+    caption = f"All energised time in a row; filled: smallest to largest of each {1e3 * WINDOW_S:.0f} ms."
+    tones_s, flux_share = subject.guarded
+    if limit and tones_s.size:
+        label = "Stator flux by the guard"
+        panels.append((f"{label}, Wb", _against(tones_s, limit * flux_share, limit, "Wb", label)))
+        caption += " Flux is the largest that the guard took for possible at each estimate under tones" + (
+            f"; between them it saw {digits(peak, 3)} Wb at most." if peak else "."
+        )
+    return marks.figure("Up to the end of the run", marks.multiples(panels, 2), caption)
+
+
+def _against(time: Signal, value: Signal, limit: float | None, unit: str, label: str) -> Markup:
+    """One quantity up to its last value, and its limit."""
+    low, high = min(0.0, float(np.min(value))), max(float(np.max(value)), limit or 0.0)
+    panel = Panel(331, 142, (0.0, float(time[-1])), (1.18 * (-high if low < 0.0 else 0.0), 1.18 * high), label, left=30)
+    panel.grid(5).axis("s", 4)
+    if low < 0.0:
+        panel.band(*envelope(time, value, WINDOW_S), kind="env")
+    else:
+        panel.line(time, value)
+    for level in [limit, -limit][: 2 if low < 0.0 else 1] if limit else ():
+        panel.level(level)
+    if limit:
+        panel.named(float(time[-1]), 1.05 * limit, f"limit {digits(limit, 3)} {unit}", "l", "end")
+    return panel.drawn()
 
 
 def beside(subject: Subject) -> Markup:

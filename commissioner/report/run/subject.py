@@ -246,6 +246,24 @@ class Subject:
                 tests[-1].append(line["record"])
         return [test for test in tests if test]
 
+    @property
+    def applied_a(self) -> tuple[Signal, Signal]:
+        """Energised time and the current along the axis, all sessions in a row."""
+        period_s = np.repeat(
+            [block.sample_period_s for _, block in self.findings.blocks],
+            [block.count for _, block in self.findings.blocks],
+        )
+        return np.cumsum(period_s), np.concatenate(self._currents)
+
+    @property
+    def guarded(self) -> tuple[Signal, Signal]:
+        """Time under tones, all tests in a row, and the flux that the guard judged, of its limit."""
+        said = [line["record"] for line in self.journal if line["kind"] == "estimate_updated"]
+        share = np.array([record["flux_fraction"] for record in said])
+        times = np.array([record["time_s"] for record in said])
+        begun = np.diff(times, prepend=0.0)
+        return np.cumsum(np.where(begun > 0.0, begun, times)), share
+
     @cached_property
     def _currents(self) -> list[Signal]:
         """The current along the axis, one array for each energised session, in order."""

@@ -43,8 +43,9 @@ class Sessions:
         self._held[session.id] = session
         return session
 
-    def find(self, identifier: str | None) -> Session | None:
-        """The session, and it counts as seen; None where it is not known or has expired."""
+    def find(self, identifier: str | None, *, is_busy: bool = True) -> Session | None:
+        """The session; None where it is not known or has expired. It counts as seen where somebody is busy with it; without a log-in
+        there is nobody to forget, and an open page will do."""
         session = self._held.get(identifier or "")
         if session is None:
             return None
@@ -52,7 +53,8 @@ class Sessions:
         if self._is_over(session, now):
             del self._held[session.id]
             return None
-        session.seen_s = now
+        if is_busy or not session.is_logged_in:
+            session.seen_s = now
         return session
 
     def end(self, identifier: str) -> None:

@@ -48,11 +48,11 @@ def parts_of(connection: HTTPConnection) -> Parts:
     return parts
 
 
-def visitor_of(connection: HTTPConnection) -> Visitor:
-    """Who this is. Loopback without accounts acts as operator."""
+def visitor_of(connection: HTTPConnection, *, is_busy: bool = True) -> Visitor:
+    """Who this is; not `is_busy`: a page that only lies open asks. Loopback without accounts acts as operator."""
     parts = parts_of(connection)
     address = connection.client.host if connection.client else ""
-    session = parts.sessions.find(connection.cookies.get(COOKIE))
+    session = parts.sessions.find(connection.cookies.get(COOKIE), is_busy=is_busy)
     needs_account = parts.needs_accounts
     if session is not None and session.is_logged_in:
         account = parts.accounts.find(session.person)

@@ -81,10 +81,14 @@ class Texts:
         return self.language == "en" or self.tell(text) != str(text)
 
     def _value(self, text: str) -> str:
-        """What stood in a sentence's gap: a number with this language's mark, a word that is known, or as it was."""
-        if re.fullmatch(r"[+-]?\d+\.\d+(?:e[+-]?\d+)?(?: [\w/ ]+)?", text):
-            return text.replace(".", ",") if self.language == "de" else text
-        return self._catalogue.messages.get(text, text)
+        """What stood in a sentence's gap: a word that is known, or as it was, its numbers with this language's mark. An address, a
+        version of three parts and a file's name are no number."""
+        said = self._catalogue.messages.get(text, text)
+        return (
+            re.sub(r"(?<![\w./])(\d+)\.(\d+(?:e[+-]?\d+)?)(?![\w./])", r"\1,\2", said)
+            if self.language == "de"
+            else said
+        )
 
     def number(self, value: float | None, digits: int, unit: str = "") -> str:
         """`3,716 Ω`: fixed digits, decimal mark of the language, true minus, no-break space before the unit."""

@@ -33,7 +33,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(CommissionerError)
     async def fail(request: Request, error: CommissionerError) -> Response:
-        return answer(request, refusal_of(error))
+        return answer(request, refusal_of(error, request.path_params))
 
     @app.exception_handler(OSError)
     async def lost(request: Request, failure: OSError) -> Response:

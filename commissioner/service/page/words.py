@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,7 +102,12 @@ class Words:
         from commissioner.diagnose.causes import CATALOGUE
 
         called = CATALOGUE[name].in_service[0] if name in CATALOGUE else ""
-        return self._t.gettext(called) if called else name.replace("_", " ").capitalize()
+        if not called:
+            called = name.replace("_", " ").capitalize()
+        return self._t.gettext(called)
+
+    def causes(self, names: Sequence[str]) -> str:
+        return ", ".join(self.cause(name) for name in names)
 
     def cause_advice(self, name: str) -> str:
         from commissioner.diagnose.causes import CATALOGUE

@@ -54,7 +54,13 @@ async def login(request: Request, response: Response, credentials: Credentials) 
 
 
 async def log_in(request: Request, credentials: Credentials) -> Session:
-    """A new session. Refusal 401: name or password is wrong; 429: too many wrong ones."""
+    """A new session. Refusal 401: name or password is wrong; 429: too many wrong ones. One is judged after the other: what comes at
+    once is counted as what comes in turn, and only what was wrong."""
+    async with parts_of(request).logging_in:
+        return await _log_in(request, credentials)
+
+
+async def _log_in(request: Request, credentials: Credentials) -> Session:
     parts = parts_of(request)
     address = request.client.host if request.client else ""
     keys = (f"address {address}", f"name {credentials.name}")
@@ -69,10 +75,10 @@ async def log_in(request: Request, credentials: Credentials) -> Session:
             remedy="wait, then try again",
             headers={"retry-after": str(int(wait_s) + 1)},
         )
-    for key in keys:
-        parts.login_tries.count(key)
     account = await asyncio.to_thread(parts.accounts.verify, credentials.name, credentials.password)
     if account is None:
+        for key in keys:
+            parts.login_tries.count(key)
         await asyncio.to_thread(parts.audit.write, credentials.name[:40], address, "log-in refused")
         raise Refusal(
             401,

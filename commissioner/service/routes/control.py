@@ -199,7 +199,7 @@ class _Socket:
     @property
     def _who(self) -> Visitor:
         """Now: a session may have ended since the page was opened, and an account may be gone."""
-        return visitor_of(self._socket)
+        return visitor_of(self._socket, is_busy=False)
 
     async def serve(self) -> None:
         await self._socket.accept()
@@ -226,6 +226,7 @@ class _Socket:
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 text = await self._socket.receive_text()
+                visitor_of(self._socket)
                 with contextlib.suppress(ValueError):
                     said = read_json(text)
                     if isinstance(said, dict):

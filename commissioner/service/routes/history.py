@@ -58,8 +58,12 @@ async def trend(request: Request, motor: str, _who: Viewer) -> TrendDocument:
 
 
 def trend_of(parts: Parts, motor: str) -> TrendDocument:
-    """The points, and of each parameter the change from the first to the last as the two are compared."""
-    entries = [e for e in parts.archive.entries(limit=1000) if e.motor == motor and e.outcome == "commissioned"]
+    """The points, and of each parameter the change from the first to the last as the two are compared. Unknown: no motor is called so, and
+    none of the archive was."""
+    runs = [e for e in parts.archive.entries(motor=motor, limit=1000) if e.motor == motor]
+    if not runs:
+        parts.library.motor(motor)
+    entries = [e for e in runs if e.outcome == "commissioned"]
     points = [_point(entry, entry.parameters) for entry in reversed(entries) if entry.parameters]
     return {"motor": motor, "points": points, "changes": _changes(parts, points) if len(points) > 1 else {}}
 

@@ -22,10 +22,11 @@ File = Annotated[str, Path(pattern=FILE)]
 
 
 class Arrival(BaseModel):
-    """The names of all files of the run."""
+    """The names of all files of the run; `sha256`: of each as it was sent, so that no other push's piece stands in it."""
 
     model_config = ConfigDict(extra="forbid")
     files: Annotated[list[Annotated[str, Field(pattern=FILE)]], Field(min_length=1, max_length=MOST_FILES)]
+    sha256: Annotated[dict[str, str], Field(max_length=MOST_FILES)] = {}
 
 
 @router.get("/api/incoming/{run}")
@@ -52,7 +53,7 @@ async def arrived(request: Request, run: Run, arrival: Arrival, who: Operator) -
     """Everything is here: proved by its chain, then put in place. `what`: copied, updated, there already, newer there, left, conflict."""
     parts = parts_of(request)
     _check_at_rest(parts, run)
-    moved = await asyncio.to_thread(parts.incoming.arrive, run, arrival.files)
+    moved = await asyncio.to_thread(parts.incoming.arrive, run, arrival.files, arrival.sha256)
     await parts.note(who, "took in a pushed run", run=run, reason=moved.what)
     return moved
 

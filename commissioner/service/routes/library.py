@@ -21,7 +21,7 @@ from commissioner.service.contract.drives import (
     ProceduresDocument,
 )
 from commissioner.service.contract.plates import JudgedPlate
-from commissioner.service.library import SIMULATOR, Drive, Library, Motor, Procedure, judge_plate, must_be_there
+from commissioner.service.library import SIMULATOR, Drive, Motor, Procedure, judge_plate, must_be_there
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.watch import describe
 from commissioner.service.simulator import SCENARIOS
@@ -74,7 +74,7 @@ async def add_drive(request: Request, table: DriveTable, who: Operator) -> Drive
 async def drive_state(request: Request, drive: str, _who: Viewer) -> DriveStateDocument:
     """The drive's own word while no run has it, and how old that is. The first call begins to look."""
     parts = parts_of(request)
-    found = _drive(parts.library, drive)
+    found = parts.library.drive(drive)
     must_be_there(found, "drive", "POST /api/simulator starts it")
     watch = parts.desk.watch(found)
     watch.want()
@@ -156,14 +156,3 @@ async def start_simulator(request: Request, scenario: str, who: Visitor) -> Driv
     if is_new:
         await parts.note(who, "started the simulator", scenario=scenario)
     return parts.library.drive(SIMULATOR)
-
-
-def _drive(library: Library, identifier: str) -> Drive:
-    from commissioner.errors import UsageError
-
-    try:
-        return library.drive(identifier)
-    except UsageError as error:
-        raise Refusal(
-            404, error.what, step=error.step, value=error.value, limit=error.limit, remedy=error.remedy
-        ) from None

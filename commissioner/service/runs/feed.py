@@ -84,10 +84,13 @@ class Feed:
         return len(self._watchers)
 
     def poll(self) -> bool:
-        """Read what is new; whether there was anything."""
-        blocks = self._blocks.new(500)  # before the journal: a block belongs to the state it was taken in
-        self._held += blocks
-        lines = self._journal.new()
+        """Read what is new; whether there was anything. What the system does not let be read now is read later: no STOP waits for it."""
+        try:
+            blocks = self._blocks.new(500)  # before the journal: a block belongs to the state it was taken in
+            self._held += blocks
+            lines = self._journal.new()
+        except OSError:
+            return False
         if lines or not blocks or time.monotonic() - self._shown_s > TOGETHER_S:
             self._show_samples()
         for line in lines:

@@ -6,7 +6,7 @@ import hashlib
 import shutil
 import threading
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -74,12 +74,14 @@ class Incoming:
                 target.write(piece)
             return start + len(piece)
 
-    def arrive(self, run: str, files: Collection[str]) -> share.Moved:
-        """All `files` are here: prove the run by its chain and put it in place. Refusal: one has not come."""
+    def arrive(self, run: str, files: Collection[str], digests: Mapping[str, str] | None = None) -> share.Moved:
+        """All `files` are here: prove the run by its chain and put it in place. Refusal: one has not come, or what is here of it is in
+        part another's who pushes another state of this run."""
         with self._alone_with(run) as folder:
-            here = _files(folder)
-            if missing := {JOURNAL, *files} - {path.name for path in here}:
-                raise Refusal(409, "not every file of the run is here", step="push", value=", ".join(sorted(missing))[:200],
+            here, sent = _files(folder), digests or {}
+            others = {path.name for path in here if path.name in sent and _state(path)["sha256"] != sent[path.name]}
+            if missing := ({JOURNAL, *files} - {path.name for path in here}) | others:
+                raise Refusal(409, "not every file of the run is here as it was sent", step="push", value=", ".join(sorted(missing))[:200],
                               limit=f"{JOURNAL} and every file named", remedy=AGAIN)  # fmt: skip
             for path in here:
                 if path.name not in files:

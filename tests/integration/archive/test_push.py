@@ -1,5 +1,6 @@
 """Runs to a service: only with an account that may, only what it lacks, whole or not at all."""
 
+import hashlib
 import shutil
 import socket
 from concurrent.futures import ThreadPoolExecutor
@@ -177,6 +178,30 @@ def test_two_pushes_of_one_run_at_once_take_nothing_from_each_other(service, tmp
         assert "push it again" in overtaken.json()["remedy"] and "push it again" in half.json()["remedy"]
     assert content(service.runs / run.name) == files
     assert push(service, run).what == "there already"
+
+
+def test_two_states_of_a_killed_run_at_once_never_mix(service, tmp_path):
+    """The chain of the older one ends before what the other sent; only the digest tells that it is not the older one's."""
+    older = RunFolder.create(tmp_path / "older", "states")
+    samples = np.ones(29)
+    older.append(SampleBlock(1, 0, 2e-4, 0.0, samples, samples, -samples, None, 540.0), 0)
+    older.journal("job", {"a": 1})
+    older.close()
+    later = tmp_path / "later" / older.path.name
+    shutil.copytree(older.path, later)
+    with (later / "blocks.bin").open("ab") as file:
+        file.write((older.path / "blocks.bin").read_bytes())
+    files, path = content(older.path), f"/api/incoming/{later.name}"
+    digests = {name: hashlib.sha256(held).hexdigest() for name, held in files.items()}
+    with logged_in(service) as client:
+        for name in sorted(files):
+            assert client.put(f"{path}/{name}", content=files[name]).status_code == 200
+        assert client.put(f"{path}/blocks.bin", content=(later / "blocks.bin").read_bytes()).status_code == 200
+        mixed = client.post(path, json={"files": sorted(files), "sha256": digests})
+    assert (mixed.status_code, mixed.json()["value"]) == (409, "blocks.bin")
+    assert "push it again" in mixed.json()["remedy"] and not (service.runs / later.name).exists()
+    assert push(service, older.path).what == "copied"
+    assert content(service.runs / later.name) == content(older.path)
 
 
 def test_a_killed_run_of_which_a_file_is_missing_has_not_arrived(service, tmp_path):

@@ -1,13 +1,16 @@
 """Who may do what: hosts, origins, tokens, roles, passwords, and the audit. The application alone, without a drive."""
 
+import asyncio
 import contextlib
 import json
 import re
 import stat
 import time
-from concurrent.futures import CancelledError
+from collections import Counter
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from pathlib import Path
 
+import httpx
 import pytest
 from argon2 import PasswordHasher
 from filelock import FileLock
@@ -283,6 +286,37 @@ def test_wrong_passwords_are_slowed_by_name_and_by_address(client, accounts, clo
     refused(client.post("/api/login", json={"name": "vera", "password": PASSWORDS["vera"]}), 429)
     clock.s += 61
     assert log_in(client, "ada")
+
+
+def test_only_wrong_passwords_are_counted_also_where_they_come_at_once(app, parts, accounts):
+    """Six people at one panel log in; then a machine guesses as fast as it can."""
+
+    async def all_at_once(client, password, most):
+        tries = (client.post("/api/login", json={"name": "ada", "password": password}) for _ in range(most))
+        return Counter(answer.status_code for answer in await asyncio.gather(*tries))
+
+    async def both():
+        transport = httpx.ASGITransport(app, client=("192.0.2.7", 1))
+        async with httpx.AsyncClient(transport=transport, base_url=BASE) as client:
+            return await all_at_once(client, PASSWORDS["ada"], 6), await all_at_once(client, "guess", 12)
+
+    with ThreadPoolExecutor(1) as apart:  # a browser's tests before this one keep a loop in the main thread
+        assert apart.submit(asyncio.run, both()).result() == ({200: 6}, {401: 5, 429: 7})
+
+
+def test_a_page_that_only_lies_open_keeps_no_log_in(client, parts, accounts, clock):
+    log_in(client, "otto")
+    cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+    with socket_of(client, cookie=cookie) as line:
+        clock.s += 1000
+        line.send_json({"stop": "somebody is there"})
+        while "stopped" not in line.receive_json():
+            pass
+        clock.s += 1000
+        while "not logged in" not in str(line.receive_json()):
+            clock.s += 100
+            assert clock.s < 5000
+    refused(client.get("/api/runs"), 401)
 
 
 def test_the_redirect_after_a_log_in_stays_here(client, accounts):

@@ -61,6 +61,12 @@ def test_what_does_not_exist_is_named(service):
     assert is_problem(service.client.post("/api/runs", json=wish), 422)["value"] == "nowhere"
     is_problem(service.client.get("/api/runs/none"), 404)
     is_problem(service.client.get("/api/nothing"), 404)
+    for path in ("/api/motors/nowhere/trend", "/api/drives/nowhere/state"):
+        assert is_problem(service.client.get(path), 404)["value"] == "nowhere"
+    is_problem(service.client.post("/api/drives/nowhere/control", json={"do": "ask"}), 404)
+    for path in ("/motors/nowhere/trend", "/drives/nowhere", "/drives/nowhere/checks?motor=motor_2kw2"):
+        page = service.client.get(path, headers={"accept": "text/html"})
+        assert page.status_code == 404 and "nowhere" in page.text
     is_problem(service.client.post("/api/runs", content=b"{", headers={"content-type": "application/json"}), 400)
 
 

@@ -10,6 +10,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from starlette.testclient import TestClient
@@ -19,6 +20,7 @@ from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings
 from commissioner.service.runs.desk import Desk, LiveRun
 from commissioner.service.runs.feed import Feed
+from commissioner.service.serving import OPEN_FILES
 from tests.support.service.service_process import ServiceProcess
 from tests.support.sim_process import SimProcess
 
@@ -170,6 +172,16 @@ def test_on_a_full_disk_nothing_is_begun_and_stop_works(client, monkeypatch):
     assert page.status_code == 200
 
 
+def test_the_service_may_open_as_many_files_as_the_system_lets_it():
+    """Each reader is one; some systems give 256 unless asked."""
+    resource = pytest.importorskip("resource")
+    code = "import resource as r; from commissioner.service.serving import _open_more_files as more; most = r.getrlimit(r.RLIMIT_NOFILE)[1]; "
+    code += "r.setrlimit(r.RLIMIT_NOFILE, (256, most)); more(); print(r.getrlimit(r.RLIMIT_NOFILE)[0])"
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert int(said) == (OPEN_FILES if most == resource.RLIM_INFINITY else min(OPEN_FILES, most))
+
+
 class Chronicle:
     """A run's folder, written by hand; its clock is off by `hours`."""
 
@@ -184,6 +196,23 @@ class Chronicle:
         self._n += 1
         with (self.folder / "journal.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+
+
+def test_a_folder_that_cannot_be_read_holds_up_no_stop(client, tmp_path, monkeypatch):
+    """As where the system has no file left to open."""
+    desk, told = client.app.state.parts.desk, list[tuple[str, str]]()
+    chronicle = Chronicle(tmp_path / "runs" / "20260101-000000-simulated", 0.0)
+    chronicle.write("about_to", action="energise")
+    feed = Feed(chronicle.folder)
+    feed.poll()
+    (chronicle.folder / "journal.jsonl").unlink()
+    (chronicle.folder / "journal.jsonl").mkdir()
+    child = SimpleNamespace(stop=lambda *word: told.append(word))
+    desk.runs[chronicle.folder.name] = LiveRun(chronicle.folder.name, "simulator", "motor_2kw2", feed, None, child)
+    monkeypatch.setattr("commissioner.service.runs.desk.CONFIRM_S", 0.05)
+    answer = client.post("/api/stop")
+    assert answer.status_code == 502 and "emergency stop" in answer.json()["remedy"]
+    assert told == [("operator", "STOP (POST)")]
 
 
 @pytest.mark.parametrize("hours", [-30.0, 30.0])

@@ -266,6 +266,26 @@ def test_a_run_that_ended_in_the_direct_currents_was_energised_and_says_so():
     assert "no tests begun" in words(run_page(lost, JOURNAL, Findings()))
 
 
+def test_a_run_that_broke_off_draws_current_and_flux_up_to_its_end():
+    """Two tests of 0.3 s each, judged every tenth: one row of 0.6 s."""
+    samples = np.full(1000, 3.0)
+    block = SampleBlock(1, 0, 2e-4, 0.0, samples, samples, -0.5 * samples, None, 540.0)
+    course = (0.1, 0.2, 0.3, 0.1, 0.2, 0.3)
+    judged = [
+        line("estimate_updated", {"time_s": s, "flux_fraction": f})
+        for s, f in zip(course, np.linspace(0.5, 1.02, 6), strict=True)
+    ]
+    stopped = result("aborted", written=False, parameters=None, magnetizing_curve=None)
+    blocks = [(0, block), (1, block)]
+    subject = Subject(stopped, [*JOURNAL, *judged], Findings(blocks=blocks), {})
+    assert subject.guarded[0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    assert subject.applied_a[0][-1] == pytest.approx(0.4) and subject.applied_a[1] == pytest.approx(3.0)
+    said = words(run_page(stopped, [*JOURNAL, *judged], Findings(blocks=blocks)))
+    assert "Up to the end of the run" in said and "limit 9.90 A" in said and "limit 0.877 Wb" in said
+    assert "Stator flux by the guard" not in words(run_page(stopped, JOURNAL, Findings(blocks=blocks)))
+    assert "The evidence" not in words(run_page(stopped, JOURNAL, Findings()))
+
+
 def test_a_run_that_broke_off_counts_what_it_did_and_speaks_of_no_result():
     """A test that came to its end stood among the missing, lost samples were "not known", and a chapter explained no interval."""
     current = np.zeros(5)

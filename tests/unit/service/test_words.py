@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.identify.estimate.axes import Cause
 from commissioner.identify.excite.duration import LongerTest
 from commissioner.identify.intake.alignment import TimeShift
@@ -35,6 +36,19 @@ OFFSETS = {f"offset_{phase}_a": size(a, 4.95e-5, "A") for phase, a in zip("uvw",
 )  # fmt: skip
 def test_the_first_size_is_shown_and_what_is_measured_alike_to_the_digits_of_its_error(sizes, shown):
     assert Words(Texts("en")).size(sizes).replace(NBSP, " ") == shown
+
+
+def test_every_cause_has_its_german_name():
+    german, english = Words(Texts("de")), Words(Texts("en"))
+    assert not [name for name in CATALOGUE if german.cause(name) == english.cause(name)]
+    assert german.causes(["device_drop", "clipping"]) == f"{german.cause('device_drop')}, Übersteuerung"
+
+
+def test_numbers_within_what_fills_a_sentence_are_german_and_what_only_looks_like_one_stays():
+    told = Texts("de").tell("6.04 s of tones on each axis would narrow the 95 % intervals (±): L_σ 0.053 -> 0.051 %")
+    assert "6,04 s" in told and "L_σ 0,053 -> 0,051 %" in told
+    for name in ("tcp://127.0.0.1:502", "1.2.3", "x1.5.csv", "runs/2.5/x"):
+        assert Texts("de")._value(name) == name
 
 
 def test_what_the_core_remarks_of_every_run_has_its_german():
