@@ -1,4 +1,4 @@
-"""Which extensions of the linear machine the data ask for: leg loss, delay, saturating iron, drifting offsets."""
+"""Which extensions of the linear machine the data ask for: leg loss, delay, saturating iron and its place, drifting offsets."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def select_model(
     begun, others = _begun(segments, period_s, starts, leg, law)
     best = min(begun, key=lambda f: f.criterion())
     start = best.gamma.as_inverse_gamma()
-    best = replace(best, model=replace(best.model, flux_scale_wb=best.peak_flux_wb))
+    best = replace(best, model=replace(best.model, flux_scale_wb=best.peak_iron_flux_wb))
     tried = {best.model}
     while True:
         better = _first_better(segments, period_s, start, best, law, tried)
@@ -112,12 +112,13 @@ def _promised(segments: Sequence[Segment], period_s: float, best: BatchFit) -> d
     """What the criterion is foreseen to gain by more or less iron, by having or not having delay and drift."""
     m = best.model
     neighbours = (
-        *(replace(m, extra_powers=n) for n in _more_or_less_iron(m.extra_powers)),
+        *(replace(m, extra_powers=n, with_split=m.with_split and n > 0) for n in _more_or_less_iron(m.extra_powers)),
+        *([replace(m, with_split=not m.with_split)] if m.extra_powers else []),
         replace(m, with_delay=not m.with_delay),
         replace(m, with_drift=not m.with_drift),
     )
     most = max(m.extra_powers, *(n.extra_powers for n in neighbours))
-    everything = replace(m, extra_powers=most, with_delay=True, with_drift=True)
+    everything = replace(m, extra_powers=most, with_delay=True, with_split=True, with_drift=True)
     seen = Foresight.at(Problem(segments, period_s, everything, is_coarse=True), extended(best, everything), best.own)
     if seen is None:
         return dict.fromkeys(neighbours, math.inf)
@@ -137,7 +138,7 @@ def _with_iron(segments: Sequence[Segment], period_s: float, start: InverseGamma
     stays in the standard errors."""
     if best.model.leg is None or best.model.extra_powers:
         return best
-    model = replace(best.model, extra_powers=1, flux_scale_wb=best.peak_flux_wb)
+    model = replace(best.model, extra_powers=1, flux_scale_wb=best.peak_iron_flux_wb)
     return next(
         iter(_those_simulated([partial(_coarse, segments, period_s, start, model, extended(best, model), best.own)])),
         best,

@@ -13,7 +13,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from commissioner.errors import DataRefused
-from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, Matrix, ModelChoice, start_theta
+from commissioner.identify.batch.model import (
+    CIRCUIT,
+    DELAY,
+    OWN,
+    SPLIT,
+    Matrix,
+    ModelChoice,
+    start_theta,
+    stator_flux_of_current,
+)
 from commissioner.identify.batch.problem import Evaluation, Problem
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.motor.circuit import InverseGamma
@@ -133,6 +142,7 @@ def _bounds(problem: Problem) -> tuple[Matrix, Matrix]:
     low, high = np.full(problem.model.size, -np.inf), np.full(problem.model.size, np.inf)
     low[:CIRCUIT], high[:CIRCUIT] = problem.bounds
     low[DELAY], high[DELAY] = -problem.period_s, 2.0 * problem.period_s
+    low[SPLIT], high[SPLIT] = -1.0, 1.0
     return low, high
 
 
@@ -184,7 +194,11 @@ def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, conver
         samples=problem.samples,
         free_parameters=int(free.size),
         residuals=tuple(s.measured(r) for s, r in zip(problem.segments, at.residuals, strict=True)),
-        stator_flux_wb=tuple(at.flux),
+        iron_flux_wb=tuple(at.flux),
+        stator_flux_wb=tuple(
+            stator_flux_of_current(theta, problem.model, flux, s.current_a - r - offset)
+            for s, flux, r, offset in zip(problem.segments, at.flux, at.residuals, own[:, 0], strict=True)
+        ),
         own=own,
         has_converged=converged,
         sample_period_s=problem.period_s,

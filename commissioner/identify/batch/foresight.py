@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commissioner.identify.batch.model import DELAY, OWN, SHARED, Matrix, ModelChoice
+from commissioner.identify.batch.model import DELAY, OWN, SHARED, SPLIT, Matrix, ModelChoice
 from commissioner.identify.batch.problem import Evaluation, Problem
 from commissioner.identify.batch.segments import PRICE
 
@@ -50,7 +50,7 @@ class Foresight:
         """(all numbers, those of `model`): what each free number of `model` moves; and which numbers it holds at zero."""
         everything = self.problem.model
         kept = np.concatenate([everything.free_shared, np.ones(self.own.size, dtype=bool)]) & self.problem.free
-        kept[DELAY] = model.with_delay
+        kept[DELAY], kept[SPLIT] = model.with_delay, model.with_split
         for m, n in enumerate(everything.exponents):
             kept[SHARED + m] = n in model.exponents
         offsets = everything.size + OWN * np.arange(len(self.own))

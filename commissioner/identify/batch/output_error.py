@@ -1,16 +1,17 @@
 """Compiled output-error simulation of one segment with its exact sensitivities, for the batch fit.
 
-Gamma circuit at standstill, everything nonlinear in it taken as extra voltage on the stator flux:
+Gamma circuit at standstill, everything nonlinear in it taken as extra voltage on the fluxes:
 
-    d psi_s/dt = u - R_s i_lin - F(i) - R_s g(psi_s)
-    d psi_R/dt = R_r (psi_s - psi_R) / L_l
-    i_lin = psi_s / L_0 + (psi_s - psi_R) / L_l,    i = i_lin + g(psi_s)
+    d psi_s/dt = u - R_s i_lin - F(i) - R_s (1 - x) g(psi_x)
+    d psi_R/dt = R_r ((psi_s - psi_R) / L_l - x g(psi_x))
+    i_lin = psi_s / L_0 + (psi_s - psi_R) / L_l,    i = i_lin + (1 - x) g(psi_x),    psi_x = (1 - x) psi_s + x psi_R
 
 g(psi) is the magnetizing current beyond psi / L_0, F(i) the inverter's voltage error along the axis, both linear in
-their coefficients. Linear part exact for held u. Of F counts its mean over the step, the current taken as straight from
+their coefficients. The split x says where between stator (0) and rotor (1) the leakage holds the iron that saturates: with it
+this is any T circuit of saturating main inductance, whose implicit law of the main flux is explicit in psi_x. Linear part exact for held u. Of F counts its mean over the step, the current taken as straight from
 end to end and solved for implicitly (A-stable: currents caught at zero do not chatter); where a current passes zero, and
 F with it from one end to the other, the step is a part of the period. One value of F per period at 5 kHz moved L_sigma by
-0.1 %. Sensitivities differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, g_1..g_m,
+0.1 %. Sensitivities differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, split, g_1..g_m,
 F_1..F_k, then the segment's own: offset, psi_s(0), psi_R(0).
 """
 
@@ -26,7 +27,8 @@ Exponents = NDArray[np.int64]
 
 CIRCUIT = 4
 DELAY = 4
-SHARED = 5
+SPLIT = 5
+SHARED = 6
 OWN = 3
 PARTS = 4
 """Steps of a period in which the current passes zero."""
@@ -85,7 +87,7 @@ def _mean_loss(
 
 @njit()
 def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
-    """(g, g') at a stator flux; the odd powers of the relative flux into `power`."""
+    """(g, g') at the iron's flux; the odd powers of the relative flux into `power`."""
     relative = flux / flux_scale
     even, reached, g, slope = 1.0, 1, 0.0, 0.0
     for m in range(exponents.size):
@@ -122,13 +124,14 @@ def _current_at_end(
     c1: float,
     beta: float,
     b1: float,
+    on_stator: float,
     i0: float,
     guess: float,
     within: float,
     power: Array,
 ) -> tuple[float, float, float, float, float, float]:
-    """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's steps, kept
-    inside what is known to hold the root.
+    """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + on_stator g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's
+    steps, kept inside what is known to hold the root.
     """
     at0 = _locate(table.size, per_a, i0)
     i, low, high = guess, -np.inf, np.inf
@@ -136,14 +139,14 @@ def _current_at_end(
     for _ in range(_MOST_STEPS):
         mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i, at0, _locate(table.size, per_a, i))
         g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1 * mean, power)
-        missed = i - free + beta * mean - g
+        missed = i - free + beta * mean - on_stator * g
         if abs(missed) <= within:
             break
         if missed > 0.0:
             high = i
         else:
             low = i
-        i -= missed / (1.0 + (beta + slope_g * b1) * by_i1)
+        i -= missed / (1.0 + (beta + on_stator * slope_g * b1) * by_i1)
         if not low < i < high:
             i = 0.5 * (low + high)
     return i, mean, by_i0, by_i1, g, slope_g
@@ -204,12 +207,23 @@ def _add_rows(rows: Array, missed: Array, information: Array, score: Array, bloc
 
 @njit(inline="always")
 def _add_directly(
-    x1: float, x2: float, l_l: float, l_0: float, power: Array, first_g: int, to_i: Array, to_g: Array
+    x1: float,
+    x2: float,
+    l_l: float,
+    l_0: float,
+    on_stator: float,
+    g: float,
+    slope_g: float,
+    power: Array,
+    to_i: Array,
+    to_g: Array,
 ) -> None:
     """Derivatives of the current, and of the iron's extra one, by the parameters at constant fluxes."""
     to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
+    to_g[SPLIT] = slope_g * (x2 - x1)
+    to_i[SPLIT] = on_stator * to_g[SPLIT] - g
     for m in range(power.size - 1):
-        to_g[first_g + m] = to_i[first_g + m] = power[m]
+        to_g[SHARED + m], to_i[SHARED + m] = power[m], on_stator * power[m]
 
 
 @njit(fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -222,9 +236,11 @@ def simulate(
     ad: Array,
     b1: Array,
     b2: Array,
+    b_r: Array,
     dad: Array,
     db1: Array,
     db2: Array,
+    db_r: Array,
     theta: Array,
     exponents: Exponents,
     flux_scale: float,
@@ -243,11 +259,11 @@ def simulate(
     rows: Array,
     is_linearised: bool,
 ) -> float:
-    """Residuals y - i into `residual`, stator flux into `flux`; where `is_linearised`, J^T W J and J^T W e added to `information`,
+    """Residuals y - i into `residual`, the iron's flux into `flux`; where `is_linearised`, J^T W J and J^T W e added to `information`,
     `score`, and the weighted sensitivities into `rows`: those of every sample where it has (n, p) rows, else of a stretch.
 
-    First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
-    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
+    First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it, `b_r` (2, 2) to
+    a voltage held on the rotor; `dad` (2, 4, 2, 2), `db1`, `db2`, `db_r` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
     `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
     from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
     (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
@@ -255,10 +271,12 @@ def simulate(
     """
     p = wanted.size
     k_f, extra_powers = basis.shape[1], exponents.size
-    first_g, first_f = SHARED, SHARED + extra_powers
+    first_f = SHARED + extra_powers
     first_own = first_f + k_f
     per_a = (basis.shape[0] - 1) / current_span
-    r_s, l_l, l_0 = theta[0], theta[2], theta[3]
+    r_s, r_r, l_l, l_0 = theta[0], theta[1], theta[2], theta[3]
+    on_stator, on_rotor = 1.0 - theta[SPLIT], theta[SPLIT]
+    is_split = extra_powers > 0 and (on_rotor != 0.0 or wanted[SPLIT] > 0.0)
     h_s, h_r = 1.0 / l_0 + 1.0 / l_l, -1.0 / l_l
     table, integral = np.zeros(basis.shape[0]), np.zeros(basis.shape[0])
     for c in range(k_f):
@@ -268,24 +286,25 @@ def simulate(
 
     x1, x2 = own[1], own[2]
     s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
-    dg, dg_last, push, d1, d2 = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
+    dg, dg_last, push, push_r, d1, d2 = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     pushed, to_s1, to_s2, to_i, to_g = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     power = np.zeros(extra_powers + 1)
     s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
-    g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
+    x_iron = on_stator * x1 + on_rotor * x2
+    g, slope_g = _extra(theta, exponents, flux_scale, x_iron, power)
     g_last = g
-    i = h_s * x1 + h_r * x2 + g
-    _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
+    i = h_s * x1 + h_r * x2 + on_stator * g
+    _add_directly(x1, x2, l_l, l_0, on_stator, g, slope_g, power, to_i, to_g)
     for j in range(p):
-        si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j] + to_i[j]
-        dg[j] = slope_g * s1[j] + to_g[j]
+        dg[j] = slope_g * (on_stator * s1[j] + on_rotor * s2[j]) + to_g[j]
+        si[j] = h_s * s1[j] + h_r * s2[j] + on_stator * (dg[j] - to_g[j]) + to_i[j]
     dg_last[:] = dg
     missed, begun, keeps = np.zeros(ROWS), 0, rows.shape[0] == u.size
     total, v_last, last_parts = 0.0, u_before, 1
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
-        residual[k], flux[k] = e, x1
+        residual[k], flux[k] = e, x_iron
         w = weight[k]
         total += w * e * e if w > 0.0 else 0.0
         if is_linearised:
@@ -305,6 +324,7 @@ def simulate(
         parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
         beta = h_s * b1[h, 0] + h_r * b1[h, 1]
         a11, a12, a21, a22, b11, b12 = ad[h, 0, 0], ad[h, 0, 1], ad[h, 1, 0], ad[h, 1, 1], b1[h, 0], b1[h, 1]
+        b_iron = on_stator * b11 + on_rotor * b12
         for part in range(parts):
             # A late step inside: its mean, and its first moment as a centred ramp of that moment.
             late, d_late = _late_share(delay, part, parts)
@@ -312,9 +332,12 @@ def simulate(
             ahead = 0.5 * last_parts / parts
             last_parts = parts
             extra = g + ahead * (g - g_last)
-            held = u[k] - late * jump - 0.5 * tilt - r_s * extra
+            held = u[k] - late * jump - 0.5 * tilt - r_s * on_stator * extra
             c1 = a11 * x1 + a12 * x2 + b11 * held + b2[h, 0] * tilt
             c2 = a21 * x1 + a22 * x2 + b12 * held + b2[h, 1] * tilt
+            held_r = -r_r * on_rotor * extra
+            if is_split:
+                c1, c2 = c1 + b_r[h, 0] * held_r, c2 + b_r[h, 1] * held_r
             g_last = g
 
             # The current at the end, sought from where the loss of the step before would leave it.
@@ -329,11 +352,12 @@ def simulate(
                     integral,
                     per_a,
                     free,
-                    c1,
+                    on_stator * c1 + on_rotor * c2,
                     beta,
-                    b11,
+                    b_iron,
+                    on_stator,
                     i0,
-                    free - beta * mean + g,
+                    free - beta * mean + on_stator * g,
                     within,
                     power,
                 )
@@ -341,41 +365,56 @@ def simulate(
                 return np.inf
             old1, old2 = x1, x2
             x1, x2 = c1 - b11 * mean, c2 - b12 * mean
+            x_iron = on_stator * x1 + on_rotor * x2
             if k_f == 0:
-                g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
-                i = h_s * x1 + h_r * x2 + g
+                g, slope_g = _extra(theta, exponents, flux_scale, x_iron, power)
+                i = h_s * x1 + h_r * x2 + on_stator * g
             held -= mean
 
             if not is_linearised:
                 continue
 
             # What the parameters add themselves, then every sensitivity; of its own loss the new current's part.
-            pushed[0], pushed[DELAY] = -extra, -(jump + 0.5 * steep) * d_late
+            pushed[0], pushed[SPLIT], pushed[DELAY] = -on_stator * extra, r_s * extra, -(jump + 0.5 * steep) * d_late
             if k_f > 0:
                 _push_of_loss(basis, basis_integral, per_a, i0, i, first_f, pushed)
             for j in range(CIRCUIT):
                 to_s1[j] = dad[h, j, 0, 0] * old1 + dad[h, j, 0, 1] * old2 + db1[h, j, 0] * held + db2[h, j, 0] * tilt
                 to_s2[j] = dad[h, j, 1, 0] * old1 + dad[h, j, 1, 1] * old2 + db1[h, j, 1] * held + db2[h, j, 1] * tilt
             to_s1[DELAY], to_s2[DELAY] = b2[h, 0] * steep * d_late, b2[h, 1] * steep * d_late
-            _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
-            scale = 1.0 / (1.0 + (beta + slope_g * b11) * by_i1)
-            h_g, back1, back2 = h_s + slope_g, b11 * by_i1, b12 * by_i1
+            _add_directly(x1, x2, l_l, l_0, on_stator, g, slope_g, power, to_i, to_g)
+            scale = 1.0 / (1.0 + (beta + on_stator * slope_g * b_iron) * by_i1)
+            h_g, h_gr = h_s + on_stator * on_stator * slope_g, h_r + on_stator * on_rotor * slope_g
+            back1, back2 = b11 * by_i1, b12 * by_i1
             # One array is written by each loop: of more, the compiler does not see that they are apart, and takes one by one.
             for j in range(p):
-                push[j] = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+                push[j] = pushed[j] - r_s * on_stator * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+            if is_split:
+                for j in range(p):
+                    push_r[j] = -r_r * on_rotor * (dg[j] + ahead * (dg[j] - dg_last[j]))
+                push_r[1] -= on_rotor * extra
+                push_r[SPLIT] -= r_r * extra
+                for j in range(CIRCUIT):
+                    to_s1[j] += db_r[h, j, 0] * held_r
+                    to_s2[j] += db_r[h, j, 1] * held_r
             dg, dg_last = dg_last, dg
             for j in range(p):
                 d1[j] = a11 * s1[j] + a12 * s2[j] + b11 * push[j] + to_s1[j]
             for j in range(p):
                 d2[j] = a21 * s1[j] + a22 * s2[j] + b12 * push[j] + to_s2[j]
+            if is_split:
+                for j in range(p):
+                    d1[j] += b_r[h, 0] * push_r[j]
+                for j in range(p):
+                    d2[j] += b_r[h, 1] * push_r[j]
             for j in range(p):
-                si[j] = (h_g * d1[j] + h_r * d2[j] + to_i[j]) * (scale * wanted[j])
+                si[j] = (h_g * d1[j] + h_gr * d2[j] + to_i[j]) * (scale * wanted[j])
             for j in range(p):
                 s1[j] = d1[j] - back1 * si[j]
             for j in range(p):
                 s2[j] = d2[j] - back2 * si[j]
             for j in range(p):
-                dg[j] = slope_g * s1[j] + to_g[j]
+                dg[j] = slope_g * (on_stator * s1[j] + on_rotor * s2[j]) + to_g[j]
     return total
 
 

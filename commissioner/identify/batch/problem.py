@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from commissioner.identify.batch import modal, output_error
-from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, SHARED, Matrix, ModelChoice
+from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, SHARED, SPLIT, Matrix, ModelChoice
 from commissioner.identify.batch.output_error import ROWS
 from commissioner.identify.batch.segments import TABLE_ROWS, Segment
 from commissioner.records import Signal, peak
@@ -180,7 +180,7 @@ class Problem:
         segment = self.segments[k]
         information, score, block, scores, residual, flux = shared
         mode, flux_per_a, jacobian = modal.modes(theta[:CIRCUIT], own[1:], self.period_s)
-        kept = np.delete(np.arange(SHARED + OWN), DELAY)
+        kept = np.delete(np.arange(SHARED + OWN), [DELAY, SPLIT])
         wanted = self.free[self.columns[k]].astype(np.float64)[kept]
         columns = np.where(np.arange(modal.MODAL) < CIRCUIT, 1.0, wanted)
         gathered = np.zeros((kept.size, kept.size)), np.zeros(kept.size), np.zeros((scores.shape[0], kept.size))
@@ -209,7 +209,7 @@ class Problem:
         wanted = self.free[self.columns[k]].astype(np.float64)
         information, score, block, scores, residual, flux = shared
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
-        ad, b1, b2, dad, db1, db2 = held
+        ad, b1, b2, b_r, dad, db1, db2, db_r = held
         squares = output_error.simulate(
             segment.voltage_v,
             segment.current_a,
@@ -219,9 +219,11 @@ class Problem:
             ad,
             b1,
             b2,
+            b_r,
             dad,
             db1,
             db2,
+            db_r,
             theta,
             np.array(model.exponents, dtype=np.int64),
             model.flux_scale_wb,
@@ -256,25 +258,26 @@ def _from_zero(table: Matrix) -> Matrix:
 
 
 def _held_with_derivatives(circuit: Matrix, period_s: float, *, is_linearised: bool) -> tuple[Matrix, ...]:
-    """(Ad, b1, b2, dAd, db1, db2): held and ramp response of (psi_s, psi_R) and derivatives, by complex steps."""
-    ad, b1, b2 = (x.real.copy() for x in _held(circuit.astype(np.complex128), period_s))
+    """(Ad, b1, b2, b_r, dAd, db1, db2, db_r): held and ramp response of (psi_s, psi_R), that to a voltage held on the rotor, and
+    derivatives, by complex steps."""
+    at = tuple(x.real.copy() for x in _held(circuit.astype(np.complex128), period_s))
     if not is_linearised:
-        return ad, b1, b2, np.zeros((CIRCUIT, 2, 2)), np.zeros((CIRCUIT, 2)), np.zeros((CIRCUIT, 2))
+        return (*at, *(np.zeros((CIRCUIT, *x.shape)) for x in at))
     derivatives = []
     for j in range(CIRCUIT):
         moved = circuit.astype(np.complex128)
         moved[j] += 1e-30j
         derivatives.append([x.imag / 1e-30 for x in _held(moved, period_s)])
-    dad, db1, db2 = (np.ascontiguousarray(np.array([d[k] for d in derivatives])) for k in range(3))
-    return ad, b1, b2, dad, db1, db2
+    return (*at, *(np.ascontiguousarray(np.array(each)) for each in zip(*derivatives, strict=True)))
 
 
 def _held(circuit: NDArray[np.complex128], period_s: float) -> tuple[NDArray[np.complex128], ...]:
     r_s, r_r, l_l, l_0 = circuit
-    block = np.zeros((4, 4), dtype=np.complex128)
+    block = np.zeros((5, 5), dtype=np.complex128)
     block[0, :3] = -r_s * (1.0 / l_0 + 1.0 / l_l), r_s / l_l, 1.0
     block[1, :2] = r_r / l_l, -r_r / l_l
-    block[:3] *= period_s
+    block[1, 4] = 1.0
+    block[:2] *= period_s
     block[2, 3] = 1.0
     exponential = expm(block)
-    return exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
+    return tuple(exponential[:2, part] for part in (slice(0, 2), 2, 3, 4))

@@ -7,7 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.identify.batch.model import CIRCUIT, DELAY, SHARED, Matrix, ModelChoice, extra_current, secant
+from commissioner.identify.batch.model import (
+    CIRCUIT,
+    DELAY,
+    SHARED,
+    SPLIT,
+    Matrix,
+    ModelChoice,
+    extra_current,
+    iron_flux,
+    secant,
+    stator_flux,
+)
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
 from commissioner.identify.inverter.compensation import Compensation
 from commissioner.identify.inverter.staircase import InverterError
@@ -37,7 +48,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class BatchFit:
-    """The fit. `theta` holds (R_s, R_r, L_l, L_0, delay in s, magnetizing coefficients in A, leg voltages in V) of the
+    """The fit. `theta` holds (R_s, R_r, L_l, L_0, delay in s, split, magnetizing coefficients in A, leg voltages in V) of the
     Gamma circuit, `covariance` theirs (zero rows where not fitted)."""
 
     model: ModelChoice
@@ -47,6 +58,7 @@ class BatchFit:
     samples: int
     free_parameters: int
     residuals: tuple[Signal, ...]
+    iron_flux_wb: tuple[Signal, ...]
     stator_flux_wb: tuple[Signal, ...]
     own: Matrix
     """(segments, 3): each segment's sensor offset in A and initial fluxes in Wb."""
@@ -68,7 +80,13 @@ class BatchFit:
 
     @property
     def peak_flux_wb(self) -> float:
-        return max(peak(f) for f in self.stator_flux_wb)
+        """Of the stator, where the iron carries at rest what it carried at most: iron that the leakage parts from the stator has not
+        seen all of the stator's flux."""
+        return stator_flux(self.theta, self.model, self.peak_iron_flux_wb)
+
+    @property
+    def peak_iron_flux_wb(self) -> float:
+        return max(peak(f) for f in self.iron_flux_wb)
 
     @property
     def gamma(self) -> Gamma:
@@ -132,7 +150,10 @@ class BatchFit:
         inverter = self.inverter()
         lost = inverter.on_axis(np.linspace(0.0, current_span_a, TABLE_ROWS), axis_deg) if inverter else np.zeros(1)
         flux = np.linspace(0.0, 1.2 * self.peak_flux_wb, TABLE_ROWS)
-        extra = extra_current(self.theta, self.model, flux) if self.model.extra_powers else np.zeros(1)
+        extra = np.zeros(1)
+        if self.model.extra_powers:
+            of_iron = np.array([iron_flux(self.theta, self.model, float(f)) for f in flux])
+            extra = extra_current(self.theta, self.model, of_iron)
         return Compensation(lost, current_span_a, extra, float(flux[-1]), float(self.theta[DELAY]))
 
     def whiteness(self) -> Whiteness:
@@ -144,6 +165,7 @@ def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
     theta = np.zeros(model.size)
     theta[:SHARED] = fit.theta[:SHARED]
     theta[DELAY] *= float(model.with_delay)
+    theta[SPLIT] *= float(model.with_split)
     ratio = model.flux_scale_wb / fit.model.flux_scale_wb
     for m, n in enumerate(model.exponents):
         if n in fit.model.exponents:

@@ -189,6 +189,7 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     disagreement = _disagreement(pao, at_flux, own + np.diag(covariance))
     values, least_squares = np.array(pao.as_tuple()), np.array(at_flux.as_tuple())
     law_error = values / least_squares - 1.0 if estimator == "lyapunov" else np.zeros(4)
+    of_batch = estimator == "nls" or batch.model.with_split  # the observer has its iron at the stator
     return AxisResult(
         axis_deg=axis_deg,
         parameters=_judged(pao, batch, at_flux, own, covariance, disagreement, estimator),
@@ -196,8 +197,8 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
         law_error=law_error,
         batch=batch,
         disagreement_sigmas=disagreement,
-        whiteness=batch.whiteness() if estimator == "nls" else whiteness(observer.residuals),
-        residual_rms_a=batch.noise_a if estimator == "nls" else observer.residual_rms_a,
+        whiteness=batch.whiteness() if of_batch else whiteness(observer.residuals),
+        residual_rms_a=batch.noise_a if of_batch else observer.residual_rms_a,
         peak_rotor_flux_wb=observer.peak_rotor_flux_wb,
         peak_stator_flux_wb=flux,
         staircase=fit.staircase,

@@ -9,7 +9,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.foresight import Foresight
-from commissioner.identify.batch.model import SHARED, ModelChoice, start_theta
+from commissioner.identify.batch.model import DELAY, SHARED, SPLIT, ModelChoice, start_theta
 from commissioner.identify.batch.problem import Problem
 from commissioner.identify.batch.segments import Segment
 from commissioner.identify.batch.whiteness import whiteness
@@ -92,7 +92,11 @@ def test_a_fractional_delay_is_a_fifth_parameter():
     assert np.max(np.abs(relative(fit))) < 5e-4
 
 
-@pytest.mark.parametrize("model", [ModelChoice(4, 1.0, LegLaw(1.5), True), ModelChoice()], ids=["all", "linear"])
+@pytest.mark.parametrize(
+    "model",
+    [ModelChoice(4, 1.0, LegLaw(1.5), True, True), ModelChoice(4, 1.0, with_split=True), ModelChoice()],
+    ids=["all", "iron between the leakages", "linear"],
+)
 def test_sensitivities_are_the_derivatives_of_the_simulation(model):
     """Information and score against finite differences of the sum of squares, saturation, knee and delay included."""
     voltage = multitone([(20.0, 0.7, 0.0), (12.0, 19.8, 2.0), (9.0, 60.1, 3.0)], 1.0, PERIOD_S)
@@ -102,13 +106,13 @@ def test_sensitivities_are_the_derivatives_of_the_simulation(model):
     weight[700:800] = 0.0
     problem = Problem([Segment(voltage, current, 30.0, False, weight=weight)], PERIOD_S, model)
     theta = start_theta(START, model, knee_shape(2.0, 0.3, 2.0))
-    if model.with_delay:
-        theta[4], theta[5:9] = 8e-5, (0.1, 0.4, 0.2, 0.1)
+    theta[DELAY], theta[SPLIT] = 8e-5 * model.with_delay, 0.4 * model.with_split
+    theta[SHARED : SHARED + model.extra_powers] = (0.1, 0.4, 0.2, 0.1)[: model.extra_powers]
     own = np.array([[0.05, 0.1, 0.08]])
     at = problem.evaluate(theta, own)
     full = np.concatenate([theta, own[0]])
     for j in np.flatnonzero(problem.free):
-        step = 1e-6 * max(abs(full[j]), 1e-3) if j != 4 else 1e-10
+        step = 1e-6 * max(abs(full[j]), 1e-3) if j != DELAY else 1e-10
         pair = []
         for sign in (1, -1):
             moved = full.copy()
@@ -124,7 +128,7 @@ def test_the_linear_machine_is_the_general_one_without_extensions():
     problem = Problem([Segment(voltage, current, 30.0, False)], PERIOD_S, ModelChoice())
     theta, own = start_theta(START, problem.model), np.array([[0.05, 0.1, 0.08]])
     modal = problem.evaluate(theta, own)
-    theta[4] = 1e-300  # a delay of nothing takes the general way
+    theta[DELAY] = 1e-300  # a delay of nothing takes the general way
     general = problem.evaluate(theta, own)
     free = np.ix_(problem.free, problem.free)
     assert modal.squares == pytest.approx(general.squares, rel=1e-10)
