@@ -65,7 +65,9 @@ def test_what_does_not_exist_is_named(service):
         assert is_problem(service.client.get(path), 404)["value"] == "nowhere"
     is_problem(service.client.post("/api/drives/nowhere/control", json={"do": "ask"}), 404)
     for path in ("/motors/nowhere/trend", "/drives/nowhere", "/drives/nowhere/checks?motor=motor_2kw2"):
-        page = httpx.get(service.url + path, headers={"accept": "text/html"}, timeout=90.0)  # no session for what follows
+        page = httpx.get(
+            service.url + path, headers={"accept": "text/html"}, timeout=90.0
+        )  # no session for what follows
         assert page.status_code == 404 and "nowhere" in page.text
     is_problem(service.client.post("/api/runs", content=b"{", headers={"content-type": "application/json"}), 400)
 
