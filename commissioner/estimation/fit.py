@@ -20,6 +20,10 @@ Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
 FIRST = (0, 1, 2, 3)
 """Numbers of a window's first state that are free: both fluxes. (8 is the speed, where the shaft is modelled and already turns.)"""
+LARGEST = 1e8
+"""Of a whitened residual or sensitivity: a run that flies away counts as enormous, and can still be squared."""
+FINITE = 1e100
+"""Before whitening, which sums."""
 LARGEST_STEP = 0.7
 """Of a logarithm in one step: a factor of 2."""
 ENDED = 0.05
@@ -196,7 +200,7 @@ def residuals(problem: Problem, machine: Machine) -> list[Array]:
             rest = problem.noise.white(w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6))
         rest[:EDGE] = 0.0
         rest[-EDGE:] = 0.0
-        out.append(np.clip(rest, -1e8, 1e8))
+        out.append(np.clip(rest, -LARGEST, LARGEST))
     return out
 
 
@@ -213,7 +217,7 @@ def held_part(problem: Problem, parts: Sequence[Array]) -> Array:
 
 
 def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> Array:
-    """Whitened sensitivities of the simulated current, (columns, fitted samples x channels)."""
+    """Whitened sensitivities of the simulated current, (columns, fitted samples x channels), cut as the residuals are."""
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
         run = np.zeros((len(columns), u, 3))
@@ -223,7 +227,8 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
         if by_load:
             indices = [columns[j].index for j in by_load]
             run[by_load] = _along_loads(problem, machine, k, max(indices) + 1)[indices]
-        white = problem.noise.white(np.nan_to_num(run, copy=False))
+        flown = np.clip(np.nan_to_num(run, copy=False), -FINITE, FINITE, out=run)
+        white = np.clip(problem.noise.white(flown), -LARGEST, LARGEST)
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0
@@ -283,7 +288,7 @@ class Fit:
 
     def covariance(self) -> Array:
         """Of the columns' numbers in fit coordinates, widened by what is left."""
-        return np.asarray(np.linalg.pinv(_normalised(self.jacobian @ self.jacobian.T)) * self.scale)
+        return _inverse(self.jacobian @ self.jacobian.T) * self.scale
 
     def std(self, name: str) -> float:
         """Of a number in its own unit; 0 where it is not free."""
@@ -293,9 +298,12 @@ class Fit:
         return float(np.sqrt(self.covariance()[place[0], place[0]]) * self.machine.slope()[AT[name]])
 
 
-def _normalised(gram: Array) -> Array:
-    """Against columns that do nothing: they get no information instead of a singular matrix."""
-    return gram + np.diag(1e-12 * np.maximum(np.diag(gram), 1e-30))
+def _inverse(gram: Array) -> Array:
+    """In units of each column's size, so that none is lost beside an enormous one; a column that does nothing makes no singular matrix."""
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    scaled = gram / np.outer(size, size)
+    scaled += np.diag(1e-12 * np.maximum(np.diag(scaled), 1e-30))
+    return np.asarray(np.linalg.pinv(scaled, hermitian=True) / np.outer(size, size))
 
 
 def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots: bool = False) -> tuple[Column, ...]:
@@ -435,7 +443,7 @@ def unbiased(problem: Problem, fit: Fit, seed: int = 6) -> Fit:
         noisy = _shaken(ideal, drawn, sign)
         along = jacobian(noisy, fit.machine, columns)
         rest = fitted_part(noisy, residuals(noisy, fit.machine))
-        drawn_aside += 0.5 * np.linalg.pinv(_normalised(along @ along.T)) @ (along @ rest)
+        drawn_aside += 0.5 * _inverse(along @ along.T) @ (along @ rest)
     logarithms = [abs(x) for c, x in zip(columns, drawn_aside, strict=True) if c.kind == "p" and c.index in LOGARITHMIC]
     if not np.isfinite(drawn_aside).all() or max(logarithms, default=0.0) > LARGEST_STEP:
         return fit

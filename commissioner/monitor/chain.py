@@ -15,6 +15,7 @@ from commissioner.monitor.intake.against_plate import (
     volts_per_hertz,
 )
 from commissioner.monitor.intake.audit import inspect
+from commissioner.monitor.intake.channels import Wiring
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.loads.mean_speed import whole_record_speed
 from commissioner.monitor.loads.members import members_of, pole_count, with_wobble
@@ -89,12 +90,13 @@ class Refused:
 @dataclass(frozen=True)
 class Wishes:
     """What the caller knows: load frequencies in Hz, the inertia, a better start than the plate; `trust`: plate | data, which is
-    right where the two contradict each other."""
+    right where the two contradict each other; `wired`: how the current channels are, where a start shows it."""
 
     load_frequencies_hz: tuple[float, ...] = ()
     inertia_kg_m2: float | None = None
     start: Start | None = None
     trust: str | None = None
+    wired: Wiring | None = None
 
 
 def observe(
@@ -106,7 +108,7 @@ def observe(
     """
     wishes = wishes or Wishes()
     start = wishes.start or Start(from_nameplate(plate), fitting.PRIOR_FROM_NAMEPLATE, "nameplate")
-    audited = inspect(recording, plate, start.circuit, lag_deg)
+    audited = inspect(recording, plate, start.circuit, lag_deg, wishes.wired)
     if audited.refusal or audited.supply is None or audited.fundamental is None:
         reason = audited.refusal or Finding("unknown", "refused", "the audit did not finish")
         return Refused(audited, reason, audited.findings)
@@ -118,8 +120,8 @@ def observe(
         return Refused(audited, wander, (*audited.findings, wander))
     search = shaft_search(audited, frame, part, plate, start)
     found = comb_search.find(frame, part, search, wishes.load_frequencies_hz)
-    if lag_deg is None and audited.rivals_deg:
-        order = better_order(audited, frame, part, plate, start, search, found)
+    if lag_deg is None and wishes.wired is None:
+        order = better_order(audited, frame, part, plate, start, search, found, wishes.trust)
         if isinstance(order, Finding):
             return Refused(audited, order, (*audited.findings, order))
         if order is not None:

@@ -76,15 +76,17 @@ def pull_out_slip(circuit: TCircuit, supply_rad_per_s: float) -> float:
 
 
 def slip_at_power(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float, power_w: float) -> float:
-    """The slip below pull-out at which the circuit draws `power_w` (all three phases) at the phase amplitude."""
+    """The slip below pull-out at which the circuit draws `power_w` (all three phases) at the phase amplitude: negative, up to that of
+    the largest power it can give, where it draws less than at synchronous speed."""
 
     def excess(slip: float) -> float:
         return 1.5 * voltage_v**2 * (1 / stator_impedance(circuit, supply_rad_per_s, slip)).real - power_w
 
-    low, high = 0.0, pull_out_slip(circuit, supply_rad_per_s)
-    if excess(low) >= 0.0:
-        return low
-    return high if excess(high) <= 0.0 else float(brentq(excess, low, high))
+    edge = pull_out_slip(circuit, supply_rad_per_s)
+    if excess(0.0) > 0.0:
+        low, high = float(minimize_scalar(excess, bounds=(-edge, 0.0), method="bounded").x), 0.0
+        return low if excess(low) >= 0.0 else float(brentq(excess, low, high))
+    return edge if excess(edge) <= 0.0 else float(brentq(excess, 0.0, edge))
 
 
 def slip_at_current(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float, current_a: float) -> float:
@@ -100,15 +102,21 @@ def slip_at_current(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float
 
 
 def slip_at_lag(circuit: TCircuit, supply_rad_per_s: float, lag_rad: float) -> float:
-    """The slip up to that of the best power factor at which the current lags by `lag_rad`."""
+    """The slip up to that of the best power factor at which the current lags by `lag_rad`; negative where it lags by more than 90 degrees."""
 
     def lag(slip: float) -> float:
         return float(np.angle(stator_impedance(circuit, supply_rad_per_s, slip)))
 
-    best = float(minimize_scalar(lag, bounds=(0.0, pull_out_slip(circuit, supply_rad_per_s)), method="bounded").x)
-    if lag_rad <= lag(best):
-        return best
-    return 0.0 if lag_rad >= lag(0.0) else float(brentq(lambda slip: lag(slip) - lag_rad, 0.0, best))
+    way = 1.0 if lag_rad <= np.pi / 2 else -1.0
+    edge = pull_out_slip(circuit, supply_rad_per_s)
+
+    def short(share: float) -> float:
+        return way * (lag(way * share) - lag_rad)
+
+    best = float(minimize_scalar(short, bounds=(0.0, edge), method="bounded").x)
+    if short(best) >= 0.0:
+        return way * best
+    return 0.0 if short(0.0) <= 0.0 else way * float(brentq(short, 0.0, best))
 
 
 STARTING_CURRENT = 6.5

@@ -29,10 +29,16 @@ HOPELESS = frozenset({"time_order", "dead_channel", "sample_rate"})
 """After these not even the fundamental means anything; after other refusals it is still reported."""
 
 
-def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_deg: float | None = None) -> Audited:
+def inspect(
+    recording: RunningRecording,
+    plate: Nameplate,
+    start: TCircuit,
+    lag_deg: float | None = None,
+    wired: channels.Wiring | None = None,
+) -> Audited:
     """Everything that can be said about the recording before any verdict; never raises on bad data.
 
-    `lag_deg`: the order of the channels is known to be that of this lag of the currents.
+    `lag_deg`: the order of the channels is known to be that of this lag of the currents; `wired`: it is known as such.
     """
     findings = Findings(Finding(note.code, "note", note.what) for note in recording.notes)
     recording, exchanged = columns.sort_by_kind(recording, plate)
@@ -58,6 +64,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
         raw_frequency,
         recording.voltages_are_line_to_line,
         lag_deg,
+        wired,
     )
     findings += pairing.findings
     if pairing.is_refused:
@@ -92,6 +99,8 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
         pairing.lag_deg,
         pairing.rivals_deg,
         pairing.others_deg,
+        pairing.generator,
+        pairing.wired,
     )
 
 

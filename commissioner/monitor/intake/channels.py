@@ -2,7 +2,8 @@
 
 Six phasors decide. A motor takes active and reactive power, so its current lags its voltage by 0 to 90 degrees; the
 nameplate says by how much at this current. The simplest mistake that explains the phasors is taken, and reported.
-At light load a second order, 60 degrees away, makes a motor as well: the slip decides (`pairing_by_slip`).
+At light load a second order, 60 degrees away, makes a motor as well, and a machine that generates looks in another order like a
+motor: the slip decides (`pairing_by_slip`), or a start, in which every machine takes power (`pairing_by_start`).
 """
 
 from __future__ import annotations
@@ -13,14 +14,16 @@ from itertools import product
 
 import numpy as np
 
-from commissioner.monitor.intake.findings import Finding, Findings
+from commissioner.monitor.intake.findings import Finding, Findings, Generator
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.running import TCircuit, slip_at_current, stator_impedance
+from commissioner.motor.running import TCircuit, slip_at_current, slip_at_power, stator_impedance
 
 Order = tuple[int, int, int]
 Sign = tuple[int, int, int]
 Option = tuple[Order, Sign, float]
+Wiring = tuple[tuple[int, int], ...]
+"""(current channel, polarity) of the phases of the voltage channels u, v, w."""
 
 SPACING_TOLERANCE_DEG = 25.0
 """Besides what the voltage's own unbalance explains: its negative sequence meets the standstill impedance, so 3 % of it make
@@ -33,6 +36,9 @@ BELOW_RATED_DEG = 25.0
 """No motor's current lags by much less than at its rated load; the rest is for tolerances, saturation and sensors."""
 RIVAL_MARGIN_DEG = 10.0
 """An idling motor's current may seem to lag by more than 90 degrees through sensors with a delay."""
+REACTIVE = (0.7, 2.0)
+"""Reactive power over that of the plate's machine at the same active power: 0.82 ... 1.75 of the 35 published machines at 0.9 ... 1.1 of
+their voltage, motor or generator up to 1.2 of their load."""
 THIRD = 2 * np.pi / 3
 
 
@@ -40,7 +46,8 @@ THIRD = 2 * np.pi / 3
 class Pairing:
     """`*_order[k]` is the channel that carries phase k, `*_sign[k]` its polarity.
 
-    `others_deg`: the lags in the other orders that a motor has too, if not at this size of the currents.
+    `others_deg`: the lags in the other orders that a motor has too, if not at this size of the currents. `generator`: the order in which
+    it would generate, where that is no greater mistake than the motor's.
     """
 
     current_order: Order
@@ -53,6 +60,8 @@ class Pairing:
     findings: tuple[Finding, ...]
     channel_map: Mapping[str, str]
     others_deg: tuple[float, ...] = ()
+    generator: Generator | None = None
+    wired: Wiring = ()
 
     @property
     def is_refused(self) -> bool:
@@ -76,8 +85,9 @@ def pair(
     frequency_hz: float,
     line_to_line: bool,
     lag_deg: float | None = None,
+    wired: Wiring | None = None,
 ) -> Pairing:
-    """The order and polarity of all channels, or findings that refuse; with `lag_deg` the order of that lag."""
+    """The order and polarity of all channels, or findings that refuse; with `lag_deg` the order of that lag, with `wired` that one."""
     findings = Findings()
     v, i = read_triple(voltages), read_triple(currents)
     _spacing("voltage", v, SPACING_TOLERANCE_DEG, findings)
@@ -88,15 +98,22 @@ def pair(
     reference = positive_sequence(star)
     explained = _explained_deg(currents, star, start, frequency_hz)
     _spacing("current", i, min(SPACING_TOLERANCE_DEG + explained, LARGEST_SPACING_DEG), findings)
+    named: Order = (0, 1, 2) if v.sequence > 0 else (0, 2, 1)
     options = _options(currents, i, reference)
+    options = [option for option in options if wiring_of(option, named) == wired] or options
     rated_lag = float(np.degrees(np.arccos(plate.power_factor)))
     is_of_plate = LEAST_CURRENT < float(np.mean(np.abs(currents))) / plate.rated_current_peak_a < LARGEST_CURRENT
     expected = _expected_lag_deg(currents, star, start, frequency_hz) if is_of_plate else rated_lag
     tolerance = LAG_TOLERANCE_DEG if is_of_plate else 90.0
-    if lag_deg is None:
-        current_order, current_sign, lag = _choose(options, expected, tolerance, v.sequence < 0, findings)
-    else:
-        current_order, current_sign, lag = min(options, key=lambda option: abs(option[2] - lag_deg))
+    of_plate = [o for o in options if is_of_plate and _is_of_plate(o, currents, star, start, frequency_hz)]
+    chosen, generating = _choose(options, of_plate, expected, tolerance, named)
+    if lag_deg is not None:
+        chosen = min(options, key=lambda option: abs(option[2] - lag_deg))
+    elif chosen is None:
+        chosen = min(options, key=lambda option: abs(option[2] - expected))
+        _refuse(chosen[2], expected, findings)
+    current_order, current_sign, lag = chosen
+    generator = Generator(generating[2], _mistakes(generating, named) == 0) if generating else None
     least = rated_lag - BELOW_RATED_DEG
     rivals = tuple(
         o[2]
@@ -112,7 +129,8 @@ def pair(
             "u-v-w",
             "exchange two phases of all channels if the motor turns forwards",
         )
-    _report_currents(current_order, current_sign, (0, 1, 2) if v.sequence > 0 else (0, 2, 1), findings)
+    _report_currents(current_order, current_sign, named, findings)
+    _report_generator(chosen, generating, lag_deg is not None, findings)
     if v.sign != (1, 1, 1):
         flipped = [name for name, sign in zip("uvw", v.sign, strict=True) if sign < 0]
         findings.add(
@@ -130,7 +148,8 @@ def pair(
     }
     return Pairing(
         current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, rivals, tuple(findings), mapping,
-        tuple(o[2] for o in options if max(least, 0.0) < o[2] < 90.0 and o[2] != lag),
+        tuple(o[2] for o in options if max(least, 0.0) < o[2] < 90.0 and o[2] != lag), generator,
+        wiring_of(chosen, named),
     )  # fmt: skip
 
 
@@ -219,36 +238,62 @@ def _expected_lag_deg(currents: list[complex], star: list[complex], start: TCirc
     return min(float(np.degrees(np.angle(stator_impedance(start, supply, slip)))), 80.0)
 
 
+def wiring_of(option: Option, named: Order) -> Wiring:
+    """The order as the channels are wired, whichever way the voltages follow each other."""
+    return tuple((option[0][k], option[1][k]) for k in named)
+
+
+def _mistakes(option: Option, named: Order) -> int:
+    return sum(option[0][k] != named[k] for k in range(3)) + sum(s < 0 for s in option[1])
+
+
+def _is_of_plate(
+    option: Option, currents: list[complex], star: list[complex], start: TCircuit, frequency_hz: float
+) -> bool:
+    """Whether the plate's machine takes this reactive power at this active power: a generator takes it as well."""
+    voltage, current = (float(np.mean(np.abs(x))) for x in (star, currents))
+    power = 1.5 * voltage * current * np.exp(1j * np.radians(option[2]))
+    supply = 2 * np.pi * frequency_hz
+    slip = slip_at_power(start, supply, voltage, float(power.real))
+    expected = 1.5 * voltage**2 * (1 / np.conj(stator_impedance(start, supply, slip))).imag
+    return bool(REACTIVE[0] < power.imag / expected < REACTIVE[1])
+
+
 def _choose(
-    options: list[Option],
-    expected_deg: float,
-    tolerance_deg: float,
-    backwards: bool,
-    findings: Findings,
-) -> Option:
-    """The simplest plausible assignment; refused where none is. Currents of foreign size say nothing of the lag, so any is plausible
-    then: it is their scale that is refused."""
-    plausible = [
-        option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < tolerance_deg
-    ]
-    if not plausible:
-        order, sign, lag = min(options, key=lambda option: abs(option[2] - expected_deg))
-        findings.add(
-            "pairing",
-            "refused",
-            "no order of the current channels makes a motor: the current's lag is "
-            f"{lag:.0f} degrees where {expected_deg:.0f} are expected",
-            lag,
-            "0 ... 90 degrees",
-            "check which current belongs to which voltage, and the polarities",
-        )
-        return order, sign, lag
-    preferred: Order = (0, 2, 1) if backwards else (0, 1, 2)
+    options: list[Option], of_plate: list[Option], expected_deg: float, tolerance_deg: float, named: Order
+) -> tuple[Option | None, Option | None]:
+    """(the simplest plausible assignment, that of a generator which is no greater mistake). A motor goes before a generator where the
+    plate allows both, or both are miswired. Currents of foreign size say nothing of the lag, so any is plausible then: it is their scale that is refused."""
+    motors = [o for o in options if 0.0 < o[2] < 90.0 and abs(o[2] - expected_deg) < tolerance_deg]
+    motor = min(motors, key=lambda o: (_mistakes(o, named), abs(o[2] - expected_deg)), default=None)
+    generator = min((o for o in of_plate if 90.0 <= o[2] < 180.0), key=lambda o: _mistakes(o, named), default=None)
+    if generator is None or (motor is not None and _mistakes(motor, named) < _mistakes(generator, named)):
+        return motor, None
+    is_motor = motor is not None and (any(o in of_plate for o in motors) or _mistakes(generator, named) > 0)
+    return (motor if is_motor else generator), generator
 
-    def mistakes(option: Option) -> int:
-        return sum(option[0][k] != preferred[k] for k in range(3)) + sum(s < 0 for s in option[1])
 
-    return min(plausible, key=lambda option: (mistakes(option), abs(option[2] - expected_deg)))
+def _refuse(lag_deg: float, expected_deg: float, findings: Findings) -> None:
+    findings.add(
+        "pairing",
+        "refused",
+        "no order of the current channels makes a motor: the current's lag is "
+        f"{lag_deg:.0f} degrees where {expected_deg:.0f} are expected",
+        lag_deg,
+        "0 ... 90 degrees",
+        "check which current belongs to which voltage, and the polarities",
+    )
+
+
+def _report_generator(chosen: Option, generating: Option | None, is_known: bool, findings: Findings) -> None:
+    """That the machine generates, or that in another order it would."""
+    if chosen == generating:
+        what = "the machine generates: active power flows out of it"
+    elif generating is not None and not is_known:
+        what = f"a machine that generates, its current lagging by {generating[2]:.0f} degrees in another order of the channels, would draw the same"
+    else:
+        return
+    findings.add("generating", "note", what, chosen[2], None, "")
 
 
 def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: Findings) -> None:

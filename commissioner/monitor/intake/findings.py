@@ -70,11 +70,19 @@ class Fundamental:
 
 
 @dataclass(frozen=True)
+class Generator:
+    """The order of channels in which the plate's machine would generate: its current's lag, and whether the columns name it so."""
+
+    lag_deg: float
+    is_named: bool
+
+
+@dataclass(frozen=True)
 class Audited:
     """The stretch that may be used, as space vectors in the right order, and everything that was found.
 
     `lag_deg` is the current's behind its voltage in the order taken, `rivals_deg` in the other orders that make a motor; `others_deg`
-    as in `Pairing`.
+    `generator` and `wired` as in `Pairing`.
     """
 
     first_sample: int
@@ -90,6 +98,8 @@ class Audited:
     lag_deg: float = 0.0
     rivals_deg: tuple[float, ...] = ()
     others_deg: tuple[float, ...] = ()
+    generator: Generator | None = None
+    wired: tuple[tuple[int, int], ...] = ()
 
     @property
     def refusal(self) -> Finding | None:

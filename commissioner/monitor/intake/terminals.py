@@ -25,11 +25,11 @@ class Terminals:
 
 
 def from_terminals(seen: Fundamental | None, plate: Nameplate) -> Terminals | None:
-    """T = (P - 3 R_s I^2) / (omega / p), and the slip that this torque has by the plate; None where no motor draws so."""
+    """T = (P - 3 R_s I^2) / (omega / p), and the slip that this torque has by the plate; None where no machine draws so."""
     if seen is None:
         return None
     apparent = math.hypot(seen.power_w, seen.reactive_var)
-    if not 0.02 * apparent < seen.power_w < 0.99 * apparent or seen.reactive_var < 0.0 or seen.frequency_hz <= 0.0:
+    if not 0.02 * apparent < abs(seen.power_w) < 0.99 * apparent or seen.reactive_var < 0.0 or seen.frequency_hz <= 0.0:
         return None
     copper = 1.5 * from_nameplate(plate).stator_resistance_ohm * abs(seen.current_a) ** 2
     synchronous = 2.0 * math.pi * seen.frequency_hz / plate.pole_pairs
@@ -43,5 +43,5 @@ def from_terminals(seen: Fundamental | None, plate: Nameplate) -> Terminals | No
     drop = plate.rated_slip * 2.0 * math.pi * plate.rated_frequency_hz / plate.pole_pairs * torque / rated_nm
     drop *= (rated_flux / flux) ** 2
     return Terminals(
-        torque, torque_std, synchronous - drop, math.hypot(SLIP_STD * drop, drop * torque_std / max(torque, 1e-9))
+        torque, torque_std, synchronous - drop, math.hypot(SLIP_STD * drop, drop * torque_std / max(abs(torque), 1e-9))
     )

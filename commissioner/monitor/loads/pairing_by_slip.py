@@ -1,7 +1,8 @@
 """Which of two channel orders: the one whose power explains the slip that the currents show.
 
 At light load two orders, 60 degrees apart, both make a motor. They differ in power by several times, so in the slip that the
-operating point asks for; the shaft's lines lie where they lie, whatever the order.
+operating point asks for; the shaft's lines lie where they lie, whatever the order. So it is with a machine that generates, which
+in another order looks like a motor: its shaft turns faster than the supply.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ def shaft_search(
     power = float(apparent.real)
     voltage = float(abs(frame.voltage_v[part].mean()))
     slip = slip_at_power(start.circuit, supply, voltage, power)
+    if not _generates(audited, audited.lag_deg + turned_deg):
+        slip = max(slip, 0.0)
     delay = abs(float(apparent.imag)) * supply * audited.sensors.skew_std_s
     late = slip_at_power(start.circuit, supply, voltage, power + delay) - slip
     std = float(np.hypot(np.hypot(SLIP_TRUST * slip, LEAST_SLIP_STD), late))
@@ -52,21 +55,30 @@ def better_order(
     start: Start,
     search: ShaftSearch,
     found: Found,
+    trust: str | None = None,
 ) -> float | Finding | None:
     """None: the order stands. A lag in degrees: the order of that lag explains the slip, this one does not. A finding: neither
     stands out.
 
-    Columns taken as they were named need no proof, but they may be contradicted.
+    Columns taken as they were named need no proof, but they may be contradicted. `trust`, where a motor with crossed channels cannot be
+    told from a generator with straight ones: "data" are as they are named, the "plate" is a motor's.
     """
     corrected = bool(miswired(audited.findings))
     own = _evidence(found, search, frame)
     verdict: float | Finding | None = None
-    for lag in audited.rivals_deg:
+    other = audited.generator if corrected else None
+    for lag in audited.rivals_deg if other is None else {*audited.rivals_deg, other.lag_deg}:
+        generates = other is not None and lag == other.lag_deg
         rival = _evidence(found, shaft_search(audited, frame, part, plate, start, lag - audited.lag_deg), frame)
         if own > rival + CLEAR or (own >= rival and not corrected):
             continue
-        if rival > own + CLEAR and corrected and 0.0 < lag < 90.0:
+        if rival > own + CLEAR and corrected and (generates or 0.0 < lag < 90.0):
             verdict, own = lag, rival
+        elif generates:
+            if trust == "data":
+                return lag
+            if trust is None and other is not None and other.is_named:
+                return _generating_or_crossed(audited, lag, own - rival)
         elif corrected or rival > own + CLEAR:
             return Finding(
                 "pairing",
@@ -82,6 +94,23 @@ def better_order(
                 "check the clamps: which current belongs to which voltage, and the polarities; or record at more load",
             )
     return verdict
+
+
+def _generates(audited: Audited, lag_deg: float) -> bool:
+    return audited.generator is not None and abs(lag_deg - audited.generator.lag_deg) < 1.0
+
+
+def _generating_or_crossed(audited: Audited, lag_deg: float, evidence: float) -> Finding:
+    return Finding(
+        "generating_or_crossed",
+        "refused",
+        f"not distinguishable: a machine that generates (the current lags by {lag_deg:.0f} degrees, as the columns are named), or a motor "
+        f"with crossed current channels ({audited.lag_deg:.0f} degrees); no start is recorded that would tell, and the slip does not",
+        lag_deg,
+        f"twice the logarithm of a likelihood ratio {CLEAR:g} ({evidence:+.1f} found)",
+        "where the columns are right, say --trust data; where the machine is a motor, name the current channels right (--map) or say "
+        "--trust plate; or record with its start",
+    )
 
 
 def _evidence(found: Found, search: ShaftSearch, frame: TurningFrame) -> float:

@@ -144,10 +144,11 @@ def strongest_in_range(spectrum: PairSpectrum, search: ShaftSearch) -> float:
 
 
 def range_hz(search: ShaftSearch) -> tuple[float, float]:
-    """Where the shaft's first line may be."""
+    """Where the shaft's first line may be: below synchronous speed, of a machine that generates above it."""
     reach = 4.0 * search.slip_std
-    low = search.synchronous_hz * (1 - min(search.slip + reach, 0.5))
-    return low, search.synchronous_hz * (1 - max(search.slip - reach, 0.0))
+    least, most = (0.0, 0.5) if search.slip >= 0.0 else (-0.5, 0.0)
+    low = search.synchronous_hz * (1 - min(search.slip + reach, most))
+    return low, search.synchronous_hz * (1 - max(search.slip - reach, least))
 
 
 def search_harmonics(band_hz: float, search: ShaftSearch) -> int:

@@ -9,10 +9,12 @@ from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.against_plate import against_plate, doubt_of, of_contradiction, over_currents
 from commissioner.monitor.intake.carrier import means_over_carrier
+from commissioner.monitor.intake.channels import Wiring
 from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.monitor.loads.pairing_by_start import wired_in
 from commissioner.monitor.partial import Partial, of_terminals, refused_audit
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
@@ -50,6 +52,7 @@ def in_its_states(
             recording,
             [as_state(s, used=False) for s in stretches],
         )
+    wishes = replace(wishes, wired=_wired(recording, stretches, plate))
     longest = max(steady, key=lambda s: s.duration_s)
     part = cut_out(recording, longest, MARGIN_S)
     note = ReadingNote(
@@ -62,6 +65,11 @@ def in_its_states(
             own = seen if stretch is longest else _watched(cut_out(recording, stretch, MARGIN_S), plate, wishes)
             _add_own(state, own, plate)
     return seen, part, out
+
+
+def _wired(recording: RunningRecording, stretches: tuple[Stretch, ...], plate: Nameplate) -> Wiring | None:
+    starts = (wired_in(cut_out(recording, s, 0.0), plate) for s in stretches if s.state == "start")
+    return next((wired for wired in starts if wired is not None), None)
 
 
 def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:

@@ -1,0 +1,165 @@
+"""A machine that generates is never taken for a motor with crossed channels without a word. Phasors are the circuit's own at negative slip;
+a start tells what a steady stretch cannot."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from commissioner.monitor.chain import Observation, Refused, Wishes
+from commissioner.monitor.intake.channels import THIRD, Pairing, pair
+from commissioner.monitor.intake.findings import miswired
+from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import (
+    TCircuit,
+    equal_leakages,
+    from_nameplate,
+    slip_at_lag,
+    slip_at_power,
+    stator_impedance,
+)
+from commissioner.operations.recordings.stretches import in_its_states
+from commissioner.records import RunningRecording
+from tests.support.running import rewired, seen_in, taken_with
+from tests.support.standstill import usable_motors
+
+MACHINES = [(m.plate, equal_leakages(InverseGamma(*m.truth))) for m in usable_motors()]
+PLATE, CIRCUIT = MACHINES[0]
+ORDERS = tuple(itertools.permutations(range(3)))
+STRAIGHT = (0, 1, 2)
+
+
+def phasors(plate: Nameplate, circuit: TCircuit, load: float, backwards: bool) -> tuple[list[complex], list[complex]]:
+    """(currents, voltages) of the phases u, v, w at a share of rated slip."""
+    impedance = stator_impedance(circuit, plate.rated_frequency_rad_per_s, load * plate.rated_slip)
+    way = -1 if backwards else 1
+    volts = [plate.rated_voltage_v * math.sqrt(2 / 3) * np.exp(-1j * way * THIRD * k) for k in range(3)]
+    return [v / impedance for v in volts], volts
+
+
+def paired(
+    machine: int, load: float, order: tuple[int, ...] = STRAIGHT, sign: int = 1, backwards: bool = False
+) -> Pairing:
+    plate, circuit = MACHINES[machine]
+    currents, volts = phasors(plate, circuit, load, backwards)
+    return pair(
+        [sign * currents[k] for k in order], volts, plate, from_nameplate(plate), plate.rated_frequency_hz, False
+    )
+
+
+def is_right(found: Pairing, order: tuple[int, ...], sign: int, backwards: bool) -> bool:
+    """Whether each phase has its own current: phase k of a sequence that runs backwards is that of the k-th of u, w, v."""
+    named = (0, 2, 1) if backwards else STRAIGHT
+    return all(order[found.current_order[k]] == named[k] and found.current_sign[k] == sign for k in range(3))
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("load", [-1.2, -0.9, -0.6, -0.4, -0.25])
+def test_a_generator_with_columns_as_named_is_never_taken_for_a_motor(load: float, backwards: bool) -> None:
+    for machine in range(len(MACHINES)):
+        found = paired(machine, load, backwards=backwards)
+        open_ = found.generator is not None and found.generator.is_named
+        assert is_right(found, STRAIGHT, 1, backwards) or found.is_refused or open_, MACHINES[machine][0]
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize(("order", "sign"), [(o, s) for o in ORDERS for s in (1, -1)])
+@pytest.mark.parametrize("load", [-1.2, -0.8, -0.5, -0.25])
+def test_a_generator_with_any_channels_is_read_right_or_with_a_word(
+    load: float, order: tuple[int, ...], sign: int, backwards: bool
+) -> None:
+    for machine in range(len(MACHINES)):
+        found = paired(machine, load, order, sign, backwards)
+        is_like_a_motor = found.lag_deg < 90.0 and not miswired(found.findings)  # crossed so that nothing shows it
+        has_word = is_like_a_motor or bool(miswired(found.findings))
+        assert is_right(found, order, sign, backwards) or found.is_refused or has_word, MACHINES[machine][0]
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("load", [0.1, 0.5, 0.8, 1.0, 1.2])
+def test_a_motor_with_columns_as_named_is_a_motor(load: float, backwards: bool) -> None:
+    for machine in range(len(MACHINES)):
+        found = paired(machine, load, backwards=backwards)
+        assert is_right(found, STRAIGHT, 1, backwards) and found.generator is None
+
+
+def recorded(
+    load: float, order: tuple[int, ...] = STRAIGHT, sign: int = 1, *, start_s: float = 0.0, seconds: float = 2.0
+) -> RunningRecording:
+    """Steady running as the circuit draws it, behind `start_s` of standing still at full voltage."""
+    period, w = 2e-4, PLATE.rated_frequency_rad_per_s
+    time = np.arange(round((seconds + start_s) / period)) * period
+    rng = np.random.default_rng(1)
+    standing, running = (phasors(PLATE, CIRCUIT, x, False) for x in (1.0 / PLATE.rated_slip, load))
+    noise = 0.002 * PLATE.rated_current_a
+    currents = [
+        sign * np.real(np.where(time < start_s, standing[0][k], running[0][k]) * np.exp(1j * w * time))
+        + noise * rng.standard_normal(time.size)
+        for k in order
+    ]
+    volts = [np.real(v * np.exp(1j * w * time)) for v in running[1]]
+    u, v, w_ = currents
+    return RunningRecording(time, (u, v, w_), (volts[0], volts[1], volts[2]), False, None, period, {}, "circuit")
+
+
+def torque_of(seen: Observation | Refused) -> float:
+    said = from_terminals(seen.audited.fundamental, PLATE)
+    assert isinstance(seen, Refused) and said is not None
+    return said.torque_nm
+
+
+def true_torque(load: float) -> float:
+    currents, volts = phasors(PLATE, CIRCUIT, load, False)
+    gap_w = 1.5 * (volts[0] * np.conj(currents[0])).real - 1.5 * CIRCUIT.stator_resistance_ohm * abs(currents[0]) ** 2
+    return float(gap_w * PLATE.pole_pairs / PLATE.rated_frequency_rad_per_s)
+
+
+@pytest.mark.parametrize("load", [-0.5, 0.5])
+@pytest.mark.parametrize(("order", "sign"), [(STRAIGHT, 1), ((1, 2, 0), -1), ((2, 0, 1), -1), ((0, 2, 1), 1)])
+def test_a_start_tells_a_generator_from_a_motor_with_crossed_channels(
+    load: float, order: tuple[int, ...], sign: int
+) -> None:
+    seen, _, _ = in_its_states(recorded(load, order, sign, start_s=0.4), PLATE, Wishes())
+    assert torque_of(seen) == pytest.approx(true_torque(load), rel=0.05)
+
+
+@pytest.mark.parametrize(("load", "order", "sign"), [(-0.35, STRAIGHT, 1), (0.5, (2, 0, 1), -1)])
+def test_without_a_start_the_two_are_not_distinguishable_until_one_is_trusted(
+    load: float, order: tuple[int, ...], sign: int
+) -> None:
+    """A generator with straight channels, and the motor with crossed ones that looks like it."""
+    recording = recorded(load, order, sign)
+    seen, _, _ = in_its_states(recording, PLATE, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == "generating_or_crossed"
+    assert "--trust data" in seen.reason.remedy and "--map" in seen.reason.remedy
+    torques = [torque_of(in_its_states(recording, PLATE, Wishes(trust=trust))[0]) for trust in ("data", "plate")]
+    assert torques[0] < 0.0 < torques[1]
+    assert torques[0 if load < 0.0 else 1] == pytest.approx(true_torque(load), rel=0.05)
+
+
+def test_the_slip_tells_a_generator_that_shakes() -> None:
+    driven = {
+        "steady_load": {"constant_nm": -9.0, "per_speed_nms": 0.0},
+        "loads": [{"kind": "compressor", "mean_nm": 0.8, "leak_mm2": [0.0, 0.0], "pressure_ratio": 4.0}],
+    }
+    recording, plate, truth = taken_with("running_compressor", 1, 8.0, driven)
+    seen = seen_in(recording, plate)
+    assert abs(seen.mean_speed_rad_per_s - truth["mean_speed_rad_per_s"]) < 4.0 * seen.mean_speed_std
+    assert abs(seen.mean_torque_nm - truth["mean_torque_nm"]) < 3.0 * seen.mean_torque_std
+    assert seen.mean_torque_nm < 0.0
+    turned = seen_in(rewired(recording, (1, 0, 2, 3, 4, 5)), plate)
+    assert turned.mean_torque_nm == pytest.approx(seen.mean_torque_nm, abs=seen.mean_torque_std)
+
+
+@pytest.mark.parametrize("slip", [-0.05, -0.01, 0.03])
+def test_the_slip_of_a_power_and_of_a_lag_is_negative_where_it_generates(slip: float) -> None:
+    w, volts = PLATE.rated_frequency_rad_per_s, PLATE.rated_voltage_v * math.sqrt(2 / 3)
+    impedance = stator_impedance(CIRCUIT, w, slip)
+    power = 1.5 * volts**2 * (1 / impedance).real
+    assert slip_at_power(CIRCUIT, w, volts, power) == pytest.approx(slip, rel=1e-6)
+    assert slip_at_lag(CIRCUIT, w, float(np.angle(impedance))) == pytest.approx(slip, rel=1e-6)
