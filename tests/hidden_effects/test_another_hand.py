@@ -213,8 +213,9 @@ def test_legs_that_differ_are_told_apart(named, legs):
 @pytest.mark.parametrize("late_s", [2e-5, long(5e-6)])
 def test_a_current_that_is_read_late_is_not_sure_to_be_iron_loss_and_never_a_cable(named, late_s):
     """It has taken late_s / L_sigma of the new voltage: a conductance, and a capacitance of that times the period."""
-    _, names = named(Machine(read_late_s=late_s), 1.5)
-    assert len(names) == 1 and any("sampling_delay" in found for found in names.values()), names
+    seen, names = named(Machine(read_late_s=late_s), 1.5)
+    assert names == {"sampling_delay": {"sampling_delay", "iron_loss"}}
+    assert seen.causes[0].sizes["delay_us"][0] == pytest.approx(-late_s * 1e6, rel=0.01)
 
 
 def test_legs_that_are_alike_are_not_said_to_differ(named):

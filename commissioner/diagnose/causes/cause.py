@@ -6,6 +6,7 @@ inverter ask the catalogue and compare no names; only causes name other causes, 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -100,6 +101,11 @@ class Standing:
     samples: float
     """Good samples of all phases: ln of it is what a number is worth."""
     rules: Rules
+
+    def saved_chi2(self, model: Model) -> float:
+        """What the numbers of causes that another model saves are worth, less what those that it adds cost."""
+        here, there = (Counter(t.effect for t in m.terms if t.effect) for m in (self.model, model))
+        return sum(self.rules.price(n) for n in here.values()) - sum(self.rules.price(n) for n in there.values())
 
 
 @dataclass(frozen=True)

@@ -44,12 +44,13 @@ def exchange(state: State, problem: Problem) -> Steps:
 
 
 def exchanged(groups: Iterable[Sequence[Proposal]], state: State, problem: Problem) -> Exchange:
-    """The first of the groups of which one is worth it: the best of that group."""
+    """The first of the groups of which one is worth it: the best of that group, by the misfit and what numbers are worth."""
     present = state.fit.chi2
     for group in groups:
         best: tuple[Fit, Proposal] | None = None
         for proposal in group:
-            wanted = present + proposal.most_chi2 if best is None else best[0].chi2 - problem.rules.floor_chi2
+            beaten = present if best is None else best[0].chi2 - best[1].most_chi2
+            wanted = beaten + proposal.most_chi2
             trial = refitted(state, problem, proposal.model, wanted)
             is_sound = trial.chi2 < wanted and _is_sound(proposal, trial, state.setting)
             step = _step(proposal.says, proposal.gone, proposal.come, present - trial.chi2, present - wanted, is_sound)

@@ -10,11 +10,11 @@ import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Procedure, Proposal, Standing, Words
 from commissioner.diagnose.causes.in_points import InPoints
-from commissioner.diagnose.causes.sampling.sampling_delay import EARLY, SamplingDelay
+from commissioner.diagnose.causes.sampling.read_late import CONDUCTANCE, EARLY, EDGE, read_late
 from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes
 from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.intake.record import Facts
-from commissioner.diagnose.kernels.kinds import BRANCH, CABLE, IRON_LOSS
+from commissioner.diagnose.kernels.kinds import BRANCH, IRON_LOSS
 from commissioner.diagnose.plant.model import Model, Term
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 SAME_STEP = 0.03
 """Of conductance times period: a capacitance so near is the conductance's own."""
-EDGE = Term("iron_loss", "edge", "F", CABLE, 0, 1e-9, 0.0, 1e-3)
-"""Charge per volt of a step of the command that a sample at that instant has seen already: conductance times period, all of it."""
 IMITATORS = ("clock_drift", "cable_capacitance")
 """They make up for some of what a current does that is read late."""
 
@@ -82,7 +80,7 @@ class IronLoss(Cause):
             for k, time in enumerate(setting.layout.branch_time_s)
             if time < 0.0
         )
-        return (Term(self.name, "conductance", "S", IRON_LOSS, 0, 1e-4, 0.0, 0.2), *paths)
+        return (CONDUCTANCE, *paths)
 
     def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """At low frequency, where eddy currents fill the sheet."""
@@ -97,7 +95,7 @@ class IronLoss(Cause):
         After d seconds the current has taken d / L_sigma of the new voltage: a conductance g of that size and a capacitance g T, or a clock
         that makes up for some of it. A conductance whose current at an instant is that of the new voltage has the capacitance g T too.
         """
-        mine, delay = here.model.of(self.name), SamplingDelay.name
+        mine, delay = here.model.of(self.name), EARLY.effect
         if mine.get("conductance", 0.0) <= 0.0 or EDGE.symbol in mine or delay in here.accepted:
             return
         beside = tuple(n for n in IMITATORS if n in here.accepted)
@@ -106,34 +104,29 @@ class IronLoss(Cause):
             bare = here.model
             for name in gone:
                 bare = bare.without(name)
-            saved = len(here.model.terms) - len(bare.terms)
-            most = here.rules.required_chi2(saved) if gone else -here.rules.floor_chi2
+            clearly = here.rules.floor_chi2 if gone else -here.rules.floor_chi2
             group = []
             if gone:
                 shown = bare.with_terms([replace(EDGE, start=bare.total(IRON_LOSS) * period)])
                 says = f"iron_loss that shows its instant's voltage in place of {'+'.join(gone)}"
+                most = clearly + here.saved_chi2(shown)
                 group.append(Proposal(shown, gone, (), most, says, lambda f: is_its_own(f, period)))
             if delay in here.names:
                 every = (self.name, *gone)
                 says = f"a current that is read late in place of {'+'.join(every)}"
-                late = read_late(bare, bare.nominal[2])
+                late = read_late(bare)
+                most = clearly + here.saved_chi2(late)
                 group.append(
                     Proposal(late, every, (delay,), most, says, lambda f: f.model.of(delay)[EARLY.symbol] < 0.0)
                 )
             yield tuple(group)
 
     def rivals(self, model: Model, absent: Collection[str]) -> Iterable[tuple[str, Model]]:
-        if EDGE.symbol in model.of(self.name) and SamplingDelay.name in absent:
-            yield SamplingDelay.name, read_late(model, model.nominal[2])
+        if EDGE.symbol in model.of(self.name) and EARLY.effect in absent:
+            yield EARLY.effect, read_late(model)
 
     def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": 1e-3 * sizes["conductance_ms"]}
-
-
-def read_late(model: Model, l_sigma: float) -> Model:
-    """The model that begins with a current read so late as makes what its iron loss does."""
-    start = max(-model.total(IRON_LOSS) * l_sigma, EARLY.lower)
-    return model.without(IronLoss.name).with_terms([replace(EARLY, start=start)])
 
 
 def is_its_own(fitted: Fit, period_s: float) -> bool:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Form, Words
+from commissioner.diagnose.causes.sampling.read_late import CONDUCTANCE, EARLY, shown_at_its_instant
 from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import DELAY
 from commissioner.diagnose.plant.impedance import impedance_starts
 from commissioner.diagnose.plant.model import Model, Term
 
-EARLY = Term("sampling_delay", "read_late", "s", DELAY, 0, 1e-6, -1e-3, 0.0)
-"""Delay below zero: the current is read after the instant that it is recorded for."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
 """Of the noise's power, and in sample periods: such delays turn the phases so far that no first-order promise shows them."""
 LATE = "Nothing to repair: one or two sampling periods are usual. A delay that is known can be taken off the current's time."
@@ -69,6 +68,10 @@ class SamplingDelay(Cause):
             late = periods * setting.facts.sample_period_s
             for start in impedance_starts(setting.record, late):
                 yield start, (replace(delay, start=late), *others)
+
+    def rivals(self, model: Model, absent: Collection[str]) -> Iterable[tuple[str, Model]]:
+        if model.of(self.name).get(EARLY.symbol, 0.0) < 0.0 and CONDUCTANCE.effect in absent:
+            yield CONDUCTANCE.effect, shown_at_its_instant(model)
 
     def words_for(self, sizes: Mapping[str, float]) -> Words:
         return self.read_late if sizes.get("delay_us", 0.0) < 0.0 else self.words
