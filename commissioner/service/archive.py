@@ -167,7 +167,7 @@ def _utc_of(run: str) -> str:
 
 def _plate_text(plate: Mapping[str, Any]) -> str:
     try:
-        return f"{plate['rated_power_w'] / 1000:g} kW, {plate['rated_voltage_v']:g} V, {plate['rated_current_a']:g} A"
+        return f"{plate['rated_power_w'] / 1000:.3g} kW, {plate['rated_voltage_v']:.4g} V, {plate['rated_current_a']:.3g} A"
     except (KeyError, TypeError, ValueError):
         return ""
 

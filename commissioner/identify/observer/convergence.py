@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,10 +37,15 @@ def settled(
     drift = tuple(abs(a / b - 1.0) for a, b in zip(since.parameters.as_tuple(), values, strict=True))
     for name, moved, s, allowed in zip((q.words for q in FOUR), drift, std, allowed_std, strict=True):
         if s > allowed:
-            return Settling(False, _four(drift), _four(std), f"{name}: standard error {s:.2%}, allowed {allowed:.2%}")
+            return Settling(
+                False, _four(drift), _four(std), f"{name}: standard error {percent(s)}, allowed {percent(allowed)}"
+            )
         if moved > max(3.0 * s, allowed / 3.0):
             return Settling(
-                False, _four(drift), _four(std), f"{name}: moved {moved:.2%} in {window_s:g} s, error {s:.2%}"
+                False,
+                _four(drift),
+                _four(std),
+                f"{name}: moved {percent(moved)} in {window_s:g} s, error {percent(s)}",
             )
     return Settling(
         True, _four(drift), _four(std), "all four parameters within their allowed standard errors and at rest"
@@ -49,3 +55,9 @@ def settled(
 def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
     a, b, c, d = values
     return a, b, c, d
+
+
+def percent(share: float) -> str:
+    """`12.95%`; a share below that with its first digit that is not zero."""
+    first = math.floor(math.log10(share)) if 0.0 < share < math.inf else 0
+    return f"{share:.{max(2, -first - 2)}%}"

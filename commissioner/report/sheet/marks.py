@@ -124,7 +124,11 @@ def _aligned(column: Column) -> Markup:
 def _cell(column: Column, cell: Text, *, is_first: bool) -> Markup:
     if is_first:
         return Markup('<th scope="row">{}</th>').format(cell)
-    name = column.label or Markup(str(column.name)).striptags()
+    name = column.label or column.name
+    if isinstance(name, Markup):  # an attribute would lose the index of a symbol
+        return Markup('<td{}><span class="col" aria-hidden="true">{}</span>{}</td>').format(
+            _aligned(column), name, cell
+        )
     return Markup('<td{} data-l="{}">{}</td>').format(_aligned(column), name, cell)
 
 

@@ -55,7 +55,10 @@ def make_report(run: RunSummary) -> None:
 
     path = Path(run.folder)
     job, findings = learn_again(path)
-    ended = RunEnded(run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s)
+    errors = [line["record"] for line in read_journal(path / "journal.jsonl") if line["kind"] == "error"]
+    ended = RunEnded(
+        run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s, errors[-1] if errors else None
+    )  # fmt: skip
     result = plain(summarise(findings, ended, run.run, job.parameter_names, job.parameter_factors))
     page = _page(path, result, findings, None)
     with closing(RunFolder(path)) as folder:

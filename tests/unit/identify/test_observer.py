@@ -7,6 +7,7 @@ import pytest
 
 from commissioner.errors import UsageError
 from commissioner.identify.inverter.compensation import Compensation
+from commissioner.identify.observer.convergence import percent
 from commissioner.identify.observer.coordinates import filter_poles, positive_real_margin
 from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
@@ -172,3 +173,8 @@ def test_a_machine_that_is_known_is_not_walked_away_from_by_repeated_reviews():
         known.review()
     assert np.max(np.abs(errors(block.parameters))) < 0.03
     assert known.parameters == block.parameters
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.1295, "12.95%"), (0.0, "0.00%"), (5e-4, "0.05%"), (1e-5, "0.001%")])
+def test_a_share_that_is_allowed_is_never_told_as_nothing(share, said):
+    assert percent(share) == said

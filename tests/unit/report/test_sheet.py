@@ -142,3 +142,10 @@ def test_a_legend_hides_no_curve():
     legend, curves = drawn[0, 0].get_legend().get_window_extent(), drawn[0, 0].get_window_extent()
     assert legend.y0 >= curves.y1
     assert legend.x1 <= figure.bbox.x1
+
+
+def test_a_symbol_keeps_its_index_where_a_card_names_its_columns():
+    columns = (marks.Column("Test"), marks.Column(marks.R_S), marks.Column("Change"))
+    said = marks.table(columns, [("1", "3.7", "0")], "cards")
+    assert '<span class="col" aria-hidden="true"><b class="n">R<sub>s</sub></b></span>3.7' in said
+    assert 'data-l="Change"' in said

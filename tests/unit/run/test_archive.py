@@ -6,6 +6,7 @@ import re
 import sqlite3
 import stat
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +17,10 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import export_run
 from commissioner.operations.history.runs import Archive as RunFolders
 from commissioner.operations.history.runs import Wanted, find_runs, index_runs, show_run, write_runs
+from commissioner.procedure.steps import Findings
 from commissioner.recordings.table import read_table, to_standstill, write_table
 from commissioner.records import SampleBlock
+from commissioner.run.archive import report
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder, write_recording
@@ -325,3 +328,26 @@ def test_a_key_has_an_end(tmp_path, size, what):
     (tmp_path / "key").write_bytes(b"k" * size)
     with pytest.raises(UsageError, match=what):
         read_key(tmp_path / "key")
+
+
+def test_a_report_made_again_tells_step_value_limit_and_remedy(tmp_path, monkeypatch):
+    error = {
+        "kind": "Aborted",
+        "what": "the flux rose",
+        "step": "multitone",
+        "value": 0.93,
+        "limit": 0.9,
+        "remedy": "check it",
+        "unit": "Wb",
+    }
+    path = make_run(
+        tmp_path, "20240105-081500-simulated-000abc", outcome="aborted", reason="the flux rose", closed=False
+    )
+    with closing(RunFolder(path)) as folder:
+        folder.journal("error", error, durable=True)
+    told = []
+    job = SimpleNamespace(parameter_names=(), parameter_factors={})
+    monkeypatch.setattr(report, "learn_again", lambda _path: (job, Findings()))
+    monkeypatch.setattr(report, "_page", lambda _path, result, *_more: told.append(result["error"]) or "")
+    report.make_report(summarise(path))
+    assert told == [error]

@@ -12,7 +12,7 @@ from commissioner.report.sheet.words import NBSP
 from commissioner.service.archive import Archive
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.routes.history import trend_of
-from tests.support.archive.synthetic import MACHINE, make_run, result_of
+from tests.support.archive.synthetic import MACHINE, PLATE, make_run, result_of
 
 COPPER_PER_K = 1.0 / (235.0 + 20.0)
 COLD, WARM = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
@@ -86,3 +86,16 @@ def test_the_page_of_two_runs_says_one_thing_of_each_parameter_in_the_readers_la
 def test_every_verdict_of_a_comparison_has_its_words():
     source, _, _ = environment().loader.get_source(environment(), "shelves/compare.html")
     assert all(f'"{one}": _(' in source for one in map(plain, Identity))
+
+
+@pytest.mark.parametrize(("language", "said"), [("en", "3.73 kW, 400 V, 7.4 A"), ("de", "3,73 kW, 400 V, 7,4 A")])
+def test_a_motor_without_a_name_is_told_by_its_plate_in_the_readers_language(tmp_path, language, said):
+    plate = {"rated_power_w": 3730.0, "rated_voltage_v": 400.0, "rated_current_a": 7.39629}
+    make_run(tmp_path, COLD, result=result_of(COLD, MACHINE), plate=PLATE | plate)
+    shown = rendered("shelves/archive.html", language, found=Archive(tmp_path).entries(), live=set(), limit=100)
+    assert said in shown
+    assert '<span class="col" aria-hidden="true">R<sub>s</sub></span>' in shown
+
+
+def test_an_unknown_motor_is_refused_in_german():
+    assert words_of("de")["tell"]("there is no motor 'PUMP-7'") == "Motor 'PUMP-7' gibt es nicht"
