@@ -36,7 +36,7 @@ def test_each_pair_is_the_same_current_in_its_own_frame() -> None:
 
 @pytest.mark.parametrize(("counts", "wanted"), [([3, 3, 1], "v"), ([3, 1, 1], "u"), ([3, 3, 3], None)])
 def test_the_pair_that_explains_by_the_fewest_causes_is_taken(monkeypatch, counts, wanted) -> None:
-    made = [SimpleNamespace(verdict=SimpleNamespace(value="explained"), causes=[0] * n) for n in counts]
+    made = [SimpleNamespace(verdict="explained", causes=[0] * n) for n in counts]
     later = iter(made[1:])
     monkeypatch.setattr(operation, "analyse", lambda *_, **__: next(later))
     one = without_computed_third(recording())
