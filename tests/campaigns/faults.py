@@ -78,18 +78,18 @@ def _told(outcome: Outcome, seed: int) -> Outcome:
 
 
 def campaign(
-    count: int, first_seed: int, wire: str, *, processes: int = 1, minutes: float = 1e9,
+    count: int, first_seed: int, wire: str, *, size: int = SHARE, processes: int = 1, minutes: float = 1e9,
     tell: Callable[[str], None] = lambda text: None,
 ) -> list[Outcome]:  # fmt: skip
-    """All shares. A sequence mostly waits for time-outs, so several processes fit on one core."""
+    """All shares, each of `size`. A sequence mostly waits for time-outs, so several processes fit on one core."""
     end = time.monotonic() + 60 * minutes
-    shares = [(min(SHARE, count - start), first_seed + k) for k, start in enumerate(range(0, count, SHARE))]
+    shares = [(min(size, count - start), first_seed + k) for k, start in enumerate(range(0, count, size))]
     if processes == 1:
-        return [outcome for size, seed in shares for outcome in share(size, seed, wire, end)]
+        return [outcome for one, seed in shares for outcome in share(one, seed, wire, end)]
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(processes, mp_context=WORKERS, initializer=_end_with_the_parent) as pool:
         futures: dict[Future[list[Outcome]], int] = {
-            pool.submit(share, size, seed, wire, end): seed for size, seed in shares
+            pool.submit(share, one, seed, wire, end): seed for one, seed in shares
         }
         for done in as_completed(futures):
             outcomes += done.result()
@@ -148,6 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.faults", description=__doc__)
     parser.add_argument("--sequences", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=0, help="seed of the first share")
+    parser.add_argument("--share", type=int, default=SHARE, help="sequences drawn from one seed")
     parser.add_argument("--wire", choices=(*WIRES, "both"), default="both")
     parser.add_argument("--processes", type=int, default=3)
     parser.add_argument("--minutes", type=float, default=1e9, help="stop after this time and report what was run")
@@ -161,8 +162,8 @@ def main(arguments: list[str] | None = None) -> int:
         outcomes = share(SHARE, options.seed, options.wire, shrinks=True)
     else:
         outcomes = campaign(
-            options.sequences, options.seed, options.wire, processes=options.processes, minutes=options.minutes,
-            tell=lambda text: print(text, flush=True),
+            options.sequences, options.seed, options.wire, size=options.share, processes=options.processes,
+            minutes=options.minutes, tell=lambda text: print(text, flush=True),
         )  # fmt: skip
     print(json.dumps(report(outcomes), indent=1))
     return int(any(outcome.broken for outcome in outcomes))

@@ -15,13 +15,13 @@ from tests.campaigns.short_run.sequences import Sequence
 from tests.campaigns.short_run.short_course import Script
 
 SCENARIO = short_scenario()
-SEQUENCES, FIRST_SEED = 24, 100_000
+SEQUENCES, SHARE, FIRST_SEED = 24, 6, 100_000
 
 
 @pytest.mark.timeout(1800)
 def test_random_faults_break_no_invariant():
-    print(f"repeat: python -m tests.campaigns.faults --sequences {SEQUENCES} --seed {FIRST_SEED}")
-    outcomes = campaign(SEQUENCES, FIRST_SEED, "both", processes=4)
+    print(f"repeat: python -m tests.campaigns.faults --sequences {SEQUENCES} --share {SHARE} --seed {FIRST_SEED}")
+    outcomes = campaign(SEQUENCES, FIRST_SEED, "both", size=SHARE, processes=4)
     print(report(outcomes))
     assert not [(outcome.sequence, outcome.broken) for outcome in outcomes if outcome.broken]
     assert len(outcomes) == SEQUENCES

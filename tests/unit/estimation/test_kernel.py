@@ -64,13 +64,14 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
         assert np.abs(differences - exact[k]).max() <= 2e-5 * max(np.abs(exact[k]).max(), 1.0), name
 
 
-LOAD = (np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 799))
-"""Four knots over 400 samples."""
+COUNT_LOADED = 100
+LOAD = (np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 2 * COUNT_LOADED - 1))
+"""Four knots over as many samples."""
 
 
 def complex_marches():
-    """(4, 400, 3): derivatives of the currents by each knot, from marches of complex numbers that are moved along it by 1e-30 i."""
-    count, (knots, places), whole = 400, LOAD, []
+    """(4, 100, 3): derivatives of the currents by each knot, from marches of complex numbers that are moved along it by 1e-30 i."""
+    count, (knots, places), whole = COUNT_LOADED, LOAD, []
     p, x = numbers(SPOKEN) + 0j, np.zeros(STATES, dtype=complex)
     for direction in np.eye(4):
         out, shaft = np.empty((count, 3), dtype=complex), np.empty((count, 2), dtype=complex)
@@ -93,8 +94,8 @@ def exact(tmp_path_factory):
 @pytest.mark.parametrize("many", [4, 3])
 def test_derivatives_along_the_loads_knots_are_those_of_complex_marches(exact, many):
     """Everything else in the machine spoken for; asked for all of them or for the first three."""
-    found = np.empty((many, 400, 3))
-    load_tangents(numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), *forcing(400), *LOAD, PERIOD, found)
+    found = np.empty((many, COUNT_LOADED, 3))
+    load_tangents(numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), *forcing(COUNT_LOADED), *LOAD, PERIOD, found)
     for one, whole in zip(found, exact, strict=False):
         assert np.abs(whole).max() > 0.0
         assert np.abs(one - whole).max() <= 1e-11 * np.abs(whole).max()
