@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -36,4 +37,17 @@ FIELDS = tuple(q.field for q in FIVE)
 def in_shown_unit(field: str, *values: float) -> str:
     """SI values of one of the five as people read them: `214 mH`, `4 ... 90 mH`."""
     quantity = next(q for q in FIVE if q.field == field)
-    return f"{' ... '.join(f'{quantity.factor * value:.4g}' for value in values)} {quantity.unit}"
+    return f"{' ... '.join(four_digits(quantity.factor * value) for value in values)} {quantity.unit}"
+
+
+def four_digits(value: float) -> str:
+    """What has no interval of its own, as a plate's values: at most four significant digits, no exponent below a million."""
+    return f"{float(f'{value:.4g}'):g}"
+
+
+def places(half: float) -> int:
+    """Decimal places at which a 95 % interval (its half, above zero) has two digits, and its value ends; below zero: tens."""
+    exponent = math.floor(math.log10(half))
+    if round(half / 10.0**exponent, 1) >= 10.0:  # 0.0996 has two digits as 0.10
+        exponent += 1
+    return 1 - exponent

@@ -9,6 +9,8 @@ from importlib.metadata import version
 
 from markupsafe import Markup
 
+from commissioner.motor.nameplate import plate_words
+from commissioner.motor.quantities import four_digits
 from commissioner.report.run.quantities import BY_FIELD, FOUR, QUANTITIES, Quantity
 from commissioner.report.run.standing import ACCEPTED
 from commissioner.report.run.subject import Record, Subject
@@ -199,8 +201,7 @@ def _motor(subject: Subject) -> Markup:
         rows.append(
             (
                 "Plate",
-                f"{1e-3 * plate['rated_power_w']:g} kW, {plate['rated_voltage_v']:g} V {plate['connection']}, "
-                f"{plate['rated_current_a']:g} A, {plate['rated_frequency_hz']:g} Hz, {plate['rated_speed_rpm']:g} 1/min, "
+                f"{plate_words(plate, plate['connection'])}, {four_digits(plate['rated_frequency_hz'])} Hz, "
                 f"cos φ {plate['power_factor']:.2f}, {2 * plate['pole_pairs']:g} poles",
             )
         )
