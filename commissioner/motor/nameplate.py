@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.quantities import four_digits
 
 Plate: TypeAlias = dict[str, float | int | str]
 """Of a nameplate what is known, by its fields' names."""
@@ -56,17 +55,6 @@ RATED_VALUES = (
     "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
 )  # fmt: skip
 """The numbers that every plate states, by their names here and in a recording; pole pairs follow from them."""
-
-
-def plate_words(plate: Mapping[str, Any], connection: str = "") -> str:
-    """`2.2 kW, 400 V star, 5 A, 1436 1/min`, by the fields' names; empty where the plate is not known."""
-    names = ("rated_power_w", "rated_voltage_v", "rated_current_a", "rated_speed_rpm")
-    try:
-        power, voltage, current, speed = (float(plate[name]) for name in names)
-    except (KeyError, TypeError, ValueError):
-        return ""
-    volts = f"{four_digits(voltage)} V {connection}".rstrip()
-    return f"{four_digits(1e-3 * power)} kW, {volts}, {four_digits(current)} A, {four_digits(speed)} 1/min"
 
 
 CONNECTIONS = {

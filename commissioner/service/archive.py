@@ -9,7 +9,7 @@ from pathlib import Path
 
 from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
-from commissioner.motor.nameplate import plate_words
+from commissioner.motor.quantities import plate_words
 from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.documents import read_document, read_result
 from commissioner.run.archive.summary import AS_BEFORE

@@ -11,7 +11,7 @@ from commissioner.cli.screens import screen
 from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
 from commissioner.cli.signals import let_end
-from commissioner.motor.nameplate import plate_words
+from commissioner.motor.quantities import plate_words
 from commissioner.operations.check import CheckRequest, check
 from commissioner.operations.commission import CommissionRequest, check_request, commission
 from commissioner.run.commission import Origin

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from commissioner.encoding import plain
-from commissioner.motor.nameplate import plate_words
+from commissioner.motor.quantities import plate_words
 from commissioner.run.archive.summary import NOT_KEPT, OLD_OR_NEW, RunSummary
 
 SCHEMA = 1

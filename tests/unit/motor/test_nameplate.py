@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, check, plate_words, prior, rated_flux
+from commissioner.motor.nameplate import Nameplate, check, prior, rated_flux
+from commissioner.motor.quantities import plate_words
 from tests.support.standstill import usable_motors
 
 PLATE = Nameplate(2200.0, 400.0, 50.0, 5.0, 1436.0, 0.8, 2, "star")
