@@ -12,6 +12,7 @@ from commissioner.history.series import FALSE_ALARM, Array, Judged, judge
 from commissioner.identify.estimate.axes import TEMPERATURE_K, scatter
 from commissioner.identify.estimate.common_ground import CommonGround, Result, at_one_flux, at_temperature
 from commissioner.motor.circuit import PARAMETERS, QUANTILE
+from commissioner.motor.quantities import places
 
 YEAR_S = 365.25 * 86400.0
 LEAST_SPAN_S = 7 * 86400.0
@@ -163,11 +164,11 @@ def _heat_sentences(results: Sequence[Result], degc: float | None) -> list[str]:
     return said
 
 
-def _percent(share: float, std: float) -> str:
+def in_percent(share: float, std: float) -> str:
     """`+8.00 ± 0.12 %`: a 95 % interval to two digits, the share as far as these."""
     half = 100 * QUANTILE * std
-    places = max(0, 1 - math.floor(math.log10(half))) if 0.0 < half < math.inf else 1
-    return f"{100 * share:+.{places}f} ± {half:.{places}f} %"
+    last = places(half) if 0.0 < half < math.inf else 1
+    return f"{round(100 * share, last):+.{max(last, 0)}f} ± {round(half, last):.{max(last, 0)}f} %"
 
 
 def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
@@ -180,12 +181,12 @@ def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
         )
         for step in trend.steps:
             said.append(
-                f"{spoken} has moved by {_percent(step.relative_change, step.relative_std)} from {step.run} on "
+                f"{spoken} has moved by {in_percent(step.relative_change, step.relative_std)} from {step.run} on "
                 f"(by chance: {step.probability:.1g})"
             )
         if trend.is_sloping and trend.slope_per_year is not None and trend.slope_std is not None:
             said.append(
-                f"{spoken} drifts by {_percent(trend.slope_per_year, trend.slope_std)} a year (by chance: "
+                f"{spoken} drifts by {in_percent(trend.slope_per_year, trend.slope_std)} a year (by chance: "
                 f"{trend.slope_probability:.1g})"
             )
         if trend.is_alarm:

@@ -108,6 +108,15 @@ def figure_of(rows: int, columns: int, height: float, **options: Any) -> tuple[F
         return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
+def plain_decades(axis: Any) -> None:
+    """A logarithmic axis named at 1, 2, 5 of each decade, and nowhere with an exponent."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
 def legend_above(axes: Any) -> None:
     """The legend in one line over the upper right corner, where it hides nothing that is drawn."""
     axes.legend(ncols=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, fontsize=7, frameon=False)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
+from commissioner.motor.quantities import plate_words
 from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.documents import read_document, read_result
+from commissioner.run.archive.summary import AS_BEFORE
+from commissioner.run.index.rows import utc_of
 from commissioner.service.contract.runs import RunWithoutResult
 from commissioner.service.problems import Refusal
 
@@ -35,6 +36,11 @@ class Entry:
     parameters: Mapping[str, Measured] | None
     flux_wb: float | None
     folder: Path
+
+    @property
+    def can_restore(self) -> bool:
+        """The drive may hold other values than the run found, and those are kept."""
+        return not self.written.startswith(AS_BEFORE) and (self.folder / "snapshot.json").is_file()
 
 
 class Archive:
@@ -132,9 +138,9 @@ def _read_entry(folder: Path) -> Entry:
     parameters = (summary.result or {}).get("parameters")
     return Entry(
         summary.run,
-        _utc_of(summary.run),
+        utc_of(summary.run),
         str(origin.get("motor", "")),
-        _plate_text(plate),
+        plate_words(plate),
         summary.drive,
         str(origin.get("person", "")),
         summary.outcome,
@@ -155,21 +161,6 @@ def _matches(entry: Entry, motor: str, drive: str, outcome: str, since: str) -> 
         and (not outcome or outcome in (entry.outcome, entry.standing))
         and (not since or entry.utc[: len(since)] >= since)
     )
-
-
-def _utc_of(run: str) -> str:
-    """A run's name begins with its time."""
-    try:
-        return dt.datetime.strptime(run[:15], "%Y%m%d-%H%M%S").replace(tzinfo=dt.UTC).isoformat()
-    except ValueError:
-        return ""
-
-
-def _plate_text(plate: Mapping[str, Any]) -> str:
-    try:
-        return f"{plate['rated_power_w'] / 1000:.3g} kW, {plate['rated_voltage_v']:.4g} V, {plate['rated_current_a']:.3g} A"
-    except (KeyError, TypeError, ValueError):
-        return ""
 
 
 def _is_name(name: str) -> bool:

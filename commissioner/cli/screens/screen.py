@@ -110,13 +110,10 @@ def shown(value: object, unit: str = "") -> str:
 
 def quantity(value: float, std: float | None, unit: str) -> str:
     """`3.702 ± 0.011 ohm`: half of the 95 % interval, and both to two digits of it."""
-    from commissioner.report.sheet.numbers import half_width  # with numpy behind it
+    from commissioner.report.sheet.numbers import half_width, with_interval  # with numpy behind it
 
     half = half_width(std)
-    if not (math.isfinite(half) and half > 0):
-        return f"{value:.4g} {unit}"
-    digits = max(0, 1 - math.floor(math.log10(half)))
-    return f"{value:.{digits}f} ± {half:.{digits}f} {unit}"
+    return f"{with_interval(value, half) if 0.0 < half < math.inf else f'{value:.4g}'} {unit}"
 
 
 def share(measured: Mapping[str, Any], std: str = "std") -> str:

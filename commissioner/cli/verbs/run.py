@@ -11,6 +11,7 @@ from commissioner.cli.screens import screen
 from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
 from commissioner.cli.signals import let_end
+from commissioner.motor.quantities import plate_words
 from commissioner.operations.check import CheckRequest, check
 from commissioner.operations.commission import CommissionRequest, check_request, commission
 from commissioner.run.commission import Origin
@@ -53,8 +54,7 @@ def _ask(request: CommissionRequest) -> None:
         raise failure
     stretched = f", stretched {job.stretch:.1f} times for a slow rotor" if job.stretch > 1.0 else ""
     screen.out.print(
-        f"[bold]{escape(drive.words)}[/], motor of {1e-3 * plate.rated_power_w:g} kW, "
-        f"{plate.rated_voltage_v:g} V, {plate.rated_current_a:g} A; {len(seen.checks)} of "
+        f"[bold]{escape(drive.words)}[/], motor of {plate_words(plate.known())}; {len(seen.checks)} of "
         f"{len(seen.checks)} checks passed.\n"
         f"[bold yellow]The motor will be energised[/] at standstill, one axis at a time: {len(plan.tests_deg)} tests, about "
         f"{job.stretch * plan.total_seconds:.0f} s in all{stretched}, never more than {job.total_time_s:.0f} s; up to "

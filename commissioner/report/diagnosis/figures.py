@@ -13,7 +13,7 @@ from commissioner.diagnose.verdict.collinearity import Alike
 from commissioner.diagnose.verdict.residuals import Correlation, Residuals, Spectrum
 from commissioner.motor.circuit import QUANTILE
 from commissioner.report.diagnosis.names import spoken
-from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, told_apart
+from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, plain_decades, told_apart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,7 +113,7 @@ def spectrum(seen: Spectrum, tones_hz: Sequence[float], has_causes: bool) -> Fig
     axes.set_ylim(0.1e3 * float(seen.noise_a.min()), 2.0 * top)
     axes.set(xlabel="frequency / Hz (thin upright lines: the test's own)", ylabel="error at each frequency / mA rms")
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_major_formatter("{x:g}")
+    plain_decades(axes.yaxis)
     _legend_above(figure, axes)
     names = [k for k in CLASS_WORDS if k in seen.by_class]
     at = np.arange(len(names))
@@ -125,7 +125,7 @@ def spectrum(seen: Spectrum, tones_hz: Sequence[float], has_causes: bool) -> Fig
     bars.axhline(1.0, color=INK, linestyle="--", linewidth=1.0)
     bars.set_yscale("log")
     bars.set_ylim(0.3, 3.0 * max(*before, *after, 1.0))
-    bars.yaxis.set_major_formatter("{x:g}")
+    plain_decades(bars.yaxis)
     bars.set_xticks(at, [CLASS_WORDS[n] for n in names], fontsize=7.5)
     bars.set_xlim(-0.7, at.size - 0.3)
     bars.set(ylabel="error, times the noise")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from commissioner.motor.circuit import QUANTILE
+from commissioner.motor.quantities import places
 
 PLUS_MINUS = "± holds the true value in 19 of 20 cases."
 PLAIN_NUMBERS = frozenset({"exponent", "samples", "without_gap_in_time"})
@@ -17,8 +18,8 @@ def number(value: float, digits: int = 4) -> str:
     """So many significant digits, no exponent between 1e-4 and 1e6."""
     if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits}g}"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
-    return f"{round(value, places):.{max(places, 0)}f}"
+    last = digits - 1 - math.floor(math.log10(abs(value)))
+    return f"{round(value, last):.{max(last, 0)}f}"
 
 
 def sure(confidence: float) -> str:
@@ -60,10 +61,10 @@ def with_spread(value: float, std: float | None, unit: str) -> str:
     if not std or not math.isfinite(std):
         return f"{number(value)}{tail}"
     spread = QUANTILE * std
-    places = min(1 - math.floor(math.log10(spread)), 8)
-    if max(abs(value), spread) < 1e-4 or abs(value) >= 1e6 or places > 6:
+    last = places(spread)
+    if max(abs(value), spread) < 1e-4 or abs(value) >= 1e6 or last > 6:
         return f"{value:.3g} ± {spread:.2g}{tail}"
-    return f"{round(value, places):.{max(places, 0)}f} ± {round(spread, places):.{max(places, 0)}f}{tail}"
+    return f"{round(value, last):.{max(last, 0)}f} ± {round(spread, last):.{max(last, 0)}f}{tail}"
 
 
 def quantity(entry: Mapping[str, Any], key: str = "") -> str:

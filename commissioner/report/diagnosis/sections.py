@@ -155,6 +155,11 @@ def not_found(document: Document) -> Section:
     )
 
 
+def _off_by(change: float) -> str:
+    """`+1.25 %`; what nobody could see in the values is not told with an exponent."""
+    return f"{'+' if change > 0.0 else ''}{number(100.0 * change, 3)} %" if abs(change) > 1e-6 else "nothing"
+
+
 def parameters(document: Document) -> Section:
     """The four values without and with the causes: how far off, never what to enter."""
     rows = []
@@ -167,7 +172,7 @@ def parameters(document: Document) -> Section:
                     q.name,
                     _plain(before, q.factor, q.unit),
                     _plain(after, q.factor, q.unit),
-                    f"{'+' if change > 0.0 else ''}{number(100.0 * change, 3)} %",
+                    _off_by(change),
                 )
             )
     return Section(

@@ -15,7 +15,7 @@ from commissioner.records import RPM
 from commissioner.report import band
 from commissioner.report.monitoring import figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
-from commissioner.report.sheet.numbers import digits, half_width, interval, like, with_interval
+from commissioner.report.sheet.numbers import digits, half_width, interval, like, percent, with_interval
 
 _WIRING = {"crossed_channels": "channels are crossed", "polarity": "a channel is inverted"}
 
@@ -72,7 +72,7 @@ def _facts(seen: Observation, verdict: Verdict | None) -> list[tuple[str, str]]:
         ),
         ("slip", f"{100 * seen.slip:.3f} %"),
         ("supply", f"{seen.lines.supply_rad_per_s / 6.283185307179586:.4f} Hz"),
-        ("measured current, simulated to", f"{seen.proof.relative_rms:.1%} rms"),
+        ("measured current, simulated to", f"{percent(seen.proof.relative_rms)} rms"),
         *(
             [("inertia used; load torque scales with it", f"{seen.inertia_kg_m2:.3g} kg m²")]
             if seen.inertia_kg_m2 is not None
@@ -143,14 +143,14 @@ def _proof(seen: Observation, document: Mapping[str, Any]) -> Section:
         picture(
             figures.resimulation(seen),
             f"Measured current, and the model's current when the measured voltage drives it at the estimated speed: they differ by "
-            f"{seen.proof.relative_rms:.1%} rms, noise and mains harmonics included.",
+            f"{percent(seen.proof.relative_rms)} rms, noise and mains harmonics included.",
         )
     ]
     if document.get("reference_speed"):
         r = document["reference_speed"]
         parts.append(
             f"Against the speed column of the recording (never an input): mean off by {r['mean_speed_relative_error']:+.4%}, "
-            f"ripple off by {r['ripple_relative_error']:.1%} of its rms."
+            f"ripple off by {percent(r['ripple_relative_error'])} of its rms."
         )
     return Section("Check: the current simulated at this speed against the measured one", *parts)
 

@@ -28,7 +28,7 @@ _TOLD: Mapping[str, Callable[[Record], str]] = {
         f"all samples so far fitted: a leg loses {digits(r['leg_error_v'], 3)} V, delay {digits(1e6 * r['delay_s'], 3)} µs"
     ),
     "guard_acted": lambda r: (
-        f"{r['advice']}: flux {100 * r['flux_fraction']:.0f} % of the limit, amplitude now {digits(r['scale'], 2)} of the plan"
+        f"{r['advice'].replace('_', ' ').lower()}: flux {100 * r['flux_fraction']:.0f} % of the limit, amplitude now {digits(r['scale'], 2)} of the plan"
     ),
     "axis_finished": lambda r: (
         f"{'first look' if r['is_look'] else 'test'}{_on_axis(r)} done after {digits(r['energised_s'], 3)} s: "
@@ -187,10 +187,7 @@ def _procedure(subject: Subject) -> Markup:
     for key, value in (plan.get("acceptance") or {}).items():
         here = f" (± {digits(half_width(value), 2)} % here)" if key.endswith("std_percent") else ""
         rows.append((key, f"{_set(key, value)}{here}"))
-    figure = marks.figure("The circuit of this report, one axis", _CIRCUIT)
-    if not rows:
-        return figure
-    return marks.section("Procedure, as run: the keys of its file", marks.facts(rows), figure, level=3)
+    return marks.section("Procedure, as run: the keys of its file", marks.facts(rows), level=3) if rows else Markup("")
 
 
 def _set(key: str, value: float) -> str:
@@ -221,9 +218,10 @@ def _circuit(subject: Subject) -> Markup:
                 ), kind="small",
             )
         )  # fmt: skip
+    conventions = marks.facts(_CONVENTIONS), marks.figure("The circuit of this report, one axis", _CIRCUIT)
     if not parts:
-        return marks.section("Conventions", marks.facts(_CONVENTIONS), level=3)
-    parts += [Markup("<h3>Conventions</h3>"), marks.facts(_CONVENTIONS)]
+        return marks.section("Conventions", *conventions, level=3)
+    parts += [Markup("<h3>Conventions</h3>"), *conventions]
     return marks.section("T circuit, for simulators that want one", *parts, level=3)
 
 

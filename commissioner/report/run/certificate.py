@@ -9,13 +9,14 @@ from importlib.metadata import version
 
 from markupsafe import Markup
 
+from commissioner.motor.quantities import four_digits, plate_words
 from commissioner.report.run.quantities import BY_FIELD, FOUR, QUANTITIES, Quantity
 from commissioner.report.run.standing import ACCEPTED
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import counted, digits, half_width, held, like, percent, signed, with_interval
-from commissioner.report.sheet.words import check_name, check_unit, seen_and_limit, spoken, typeset
+from commissioner.report.sheet.words import NBSP, check_name, check_unit, seen_and_limit, spoken, typeset
 
 _COLUMNS = (
     Column("Parameter"),
@@ -127,7 +128,7 @@ def _why(subject: Subject) -> Markup:
         return marks.section("Why", marks.table(columns, rows), kind="why")
     columns = (Column("Step"), Column("Seen", right=True), Column("Limit", right=True), Column("What happened"))
     row = (
-        str(error.get("step") or "—"), *_weighed(error), _said_by(error.get("what") or subject.result["reason"]),
+        typeset(str(error.get("step") or "—")), *_weighed(error), _said_by(error.get("what") or subject.result["reason"]),
     )  # fmt: skip
     return marks.section("Why", marks.table(columns, [row]), kind="why")
 
@@ -199,9 +200,8 @@ def _motor(subject: Subject) -> Markup:
         rows.append(
             (
                 "Plate",
-                f"{1e-3 * plate['rated_power_w']:g} kW, {plate['rated_voltage_v']:g} V {plate['connection']}, "
-                f"{plate['rated_current_a']:g} A, {plate['rated_frequency_hz']:g} Hz, {plate['rated_speed_rpm']:g} 1/min, "
-                f"cos φ {plate['power_factor']:.2f}, {2 * plate['pole_pairs']:g} poles",
+                f"{plate_words(plate, plate['connection'])}, {four_digits(plate['rated_frequency_hz'])} Hz, "
+                f"cos φ{NBSP}{plate['power_factor']:.2f}, {2 * plate['pole_pairs']:g}{NBSP}poles",
             )
         )
     winding = subject.result.get("winding_temperature_degc", subject.findings.winding_degc)
@@ -225,7 +225,7 @@ def _drive(subject: Subject) -> Markup:
     if drive["map_version"] is not None:
         rows.append(("Register map", str(drive["map_version"])))
     if (rated := drive["rated_drive_current_a"]) is not None and math.isfinite(rated):
-        rows.append(("Rated", f"{rated:.1f} A, switching at {1e-3 * drive['switching_frequency_hz']:g} kHz"))
+        rows.append(("Rated", f"{rated:.1f} A, switching at {1e-3 * drive['switching_frequency_hz']:g}{NBSP}kHz"))
     rows += [(words, seen_and_limit(seen[check], check_unit(check))[0]) for check, words in _SEEN if check in seen]
     return marks.section("Drive", marks.facts(rows))
 

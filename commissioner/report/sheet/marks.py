@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -45,8 +46,8 @@ class Column:
 
 
 def capitalised(text: str) -> str:
-    """Begun with a capital: `DC link sag` stays, `dead time` becomes `Dead time`."""
-    return text[:1].upper() + text[1:]
+    """Begun with a capital: `DC link sag` stays, `dead time` becomes `Dead time`; a key of a file, as `limits.flux_fraction`, stays."""
+    return text if re.match(r"\w+\.\w", text) else text[:1].upper() + text[1:]
 
 
 def coded(text: str) -> Markup:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from commissioner.motor.circuit import QUANTILE
+from commissioner.motor.quantities import places
 
 
 def half_width(std: float | None, factor: float = 1.0) -> float:
@@ -19,8 +20,7 @@ def interval(value: float, half: float) -> tuple[str, str]:
     """
     if not (half > 0.0 and math.isfinite(half)):
         return digits(value, 3), ""
-    places = _places(half)
-    return fixed(value, places), fixed(half, places)
+    return fixed(value, places(half)), fixed(half, places(half))
 
 
 def with_interval(value: float, half: float) -> str:
@@ -31,7 +31,7 @@ def with_interval(value: float, half: float) -> str:
 
 def like(value: float, half: float) -> str:
     """Another value of the same quantity, to the same place as one with this interval."""
-    return fixed(value, _places(half)) if half > 0.0 else digits(value, 3)
+    return fixed(value, places(half)) if half > 0.0 else digits(value, 3)
 
 
 def digits(value: float, count: int) -> str:
@@ -43,9 +43,9 @@ def digits(value: float, count: int) -> str:
     return fixed(value, max(0, count - 1 - math.floor(math.log10(abs(value)))))
 
 
-def fixed(value: float, places: int) -> str:
+def fixed(value: float, decimals: int) -> str:
     """With a true minus sign, and no minus before nothing."""
-    text = f"{value:.{places}f}"
+    text = f"{round(value, decimals):.{max(0, decimals)}f}"
     if not float(text):
         text = text.removeprefix("-")
     return text.replace("-", "−")
@@ -71,10 +71,3 @@ def counted(number: int, noun: str) -> str:
 def held(value: float) -> str:
     """A drive's own number, to the nine digits that tell two neighbouring 32-bit floats apart."""
     return f"{value:.9g}".replace("-", "−")
-
-
-def _places(half: float) -> int:
-    exponent = math.floor(math.log10(half))
-    if round(half / 10.0**exponent, 1) >= 10.0:  # 0.0996 has two digits as 0.10
-        exponent += 1
-    return max(0, 1 - exponent)

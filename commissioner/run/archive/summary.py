@@ -19,7 +19,8 @@ NOT_KEPT = frozenset({"folder", "result"})
 """Fields of a summary that `summary.json` is without: where the folder lies, the whole result."""
 NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
-RESTORED, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before (restored)", "old or new", "cut off", "unreadable"
+AS_BEFORE, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before", "old or new", "cut off", "unreadable"
+RESTORED = f"{AS_BEFORE} (restored)"
 STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, "rejected", "aborted", "faulted", CUT_OFF, UNREADABLE)
 """How a run can have ended, or stand."""
 
@@ -210,7 +211,7 @@ _TUNINGS = ("tuning_began", "tuned_once", "tuning_ended", "tunings_judged")
 
 def _written(records: list[Record]) -> str:
     """Old, new, or unknown: the last announcement or confirmation in the journal decides."""
-    said = "as before"
+    said = AS_BEFORE
     for line in records:
         if line["kind"] == "parameters_written":
             said = "new" + _kept(line["record"]) + _wear(line["record"])

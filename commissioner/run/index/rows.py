@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from commissioner.encoding import plain
+from commissioner.motor.quantities import plate_words
 from commissioner.run.archive.summary import NOT_KEPT, OLD_OR_NEW, RunSummary
 
 SCHEMA = 1
@@ -144,17 +145,6 @@ def utc_of(run: str) -> str:
     if len(digits) < 14 or not (digits.isascii() and digits.isdigit()) or run[8] != "-":
         return ""
     return f"{run[:4]}-{run[4:6]}-{run[6:8]}T{run[9:11]}:{run[11:13]}:{run[13:15]}+00:00"
-
-
-def plate_words(plate: Mapping[str, Any]) -> str:
-    """`2.2 kW, 400 V, 5 A, 1420 rpm`; empty where the plate is not known."""
-    try:
-        return (
-            f"{plate['rated_power_w'] / 1000:g} kW, {plate['rated_voltage_v']:g} V, {plate['rated_current_a']:g} A, "
-            f"{plate['rated_speed_rpm']:g} rpm"
-        )
-    except (KeyError, TypeError, ValueError):
-        return ""
 
 
 def _part(value: str) -> str:

@@ -64,7 +64,7 @@ def words_of(language: str) -> Mapping[str, Callable[..., Any] | Texts | Words]:
         "t": texts,
         "w": Words(texts),
     }
-    return said | {"n": texts.number, "signed": texts.signed, "short": texts.short}
+    return said | {"n": texts.number, "signed": texts.signed, "short": texts.short, "told": texts.with_error}
 
 
 def prepare() -> None:

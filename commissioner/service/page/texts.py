@@ -13,6 +13,8 @@ from typing import Any
 from babel.messages.pofile import read_po
 from starlette.requests import HTTPConnection
 
+from commissioner.motor.circuit import QUANTILE
+from commissioner.motor.quantities import places
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.problems import Refusal
 
@@ -95,15 +97,18 @@ class Texts:
         if value is None or not math.isfinite(value):
             return self.gettext("no value")
         shown = 0.0 if round(value, digits) == 0 else value
-        text = f"{shown:.{digits}f}".replace("-", "\u2212")
+        text = f"{round(shown, digits):.{max(0, digits)}f}".replace("-", "\u2212")
         if self.language == "de":
             text = text.replace(".", ",")
         return text + (NBSP + unit if unit else "")
 
-    def with_error(self, value: float, error: float, unit: str) -> str:
-        """`0.025640 ± 0.000097 A`: the error (above zero) to two digits, the value as far as these."""
-        digits = min(max(0, 1 - math.floor(math.log10(error))), 9)
-        return f"{self.number(value, digits)} ± {self.number(error, digits, UNIT_SIGNS.get(unit, unit))}"
+    def with_error(self, value: float, std: float | None, unit: str) -> str:
+        """`0.025640 ± 0.000097 A`: the 95 % interval to two digits, the value as far as these."""
+        half = QUANTILE * (std or 0.0)
+        if not 0.0 < half < math.inf:
+            return self.short(value, unit)
+        digits = min(places(half), 9)
+        return f"{self.number(value, digits)} ± {self.number(half, digits, UNIT_SIGNS.get(unit, unit))}"
 
     def signed(self, value: float | None, digits: int, unit: str = "") -> str:
         text = self.number(value, digits, unit)
@@ -124,7 +129,7 @@ class Texts:
                 head, *rest = text.split(NBSP)
                 text = NBSP.join([head.rstrip("0").rstrip(mark), *rest])
             return text
-        return self.gettext("no value") if value is None else self.tell(value)
+        return self.gettext("no value") if value is None else self._value(self.tell(value))
 
 
 def texts_of(connection: HTTPConnection) -> Texts:

@@ -9,7 +9,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from commissioner.motor.circuit import QUANTILE
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import NBSP, UNITS, check_name, spoken
 from commissioner.service.page.texts import Texts
@@ -123,10 +122,7 @@ class Words:
         return "; ".join(self._one_size(size) for size in (known[:1] + alike)[:3])
 
     def _one_size(self, size: Mapping[str, Any]) -> str:
-        value, std, unit = float(size["value"]), float(size.get("std") or 0.0), str(size.get("unit") or "")
-        if std <= 0.0:
-            return self._t.short(value, unit)
-        return self._t.with_error(value, QUANTILE * std, unit)
+        return self._t.with_error(float(size["value"]), size.get("std"), str(size.get("unit") or ""))
 
     def _unit(self, check: Mapping[str, Any]) -> tuple[str, int]:
         return UNITS.get(check_name(str(check["name"])), ("", 1))

@@ -332,7 +332,6 @@ async def run(request: Request, run: str) -> Response:
         "is_diagnosing": not is_over,
         "losses": await asyncio.to_thread(losses_at_sight, entry.folder) if is_over else (),
         "has_report": (entry.folder / "report.html").is_file(),
-        "has_snapshot": (entry.folder / "snapshot.json").is_file(),
     }
     if (result.get("tune") or {}).get("rows"):
         return tuned_page(request, place, **facts)

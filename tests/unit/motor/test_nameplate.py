@@ -9,6 +9,7 @@ import pytest
 
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, check, prior, rated_flux
+from commissioner.motor.quantities import plate_words
 from tests.support.standstill import usable_motors
 
 PLATE = Nameplate(2200.0, 400.0, 50.0, 5.0, 1436.0, 0.8, 2, "star")
@@ -81,3 +82,16 @@ def test_a_small_motors_delta_voltage_beside_its_star_current_is_refused_with_th
 def test_the_electrical_input_given_as_the_power_is_refused():
     (problem,) = check(dataclasses.replace(PLATE, rated_power_w=2626.0, rated_current_a=4.86, power_factor=0.78))
     assert "the one at the shaft" in problem.expected
+
+
+@pytest.mark.parametrize(
+    ("plate", "said"),
+    [
+        ((3730.0, 400.0, 7.39629, 1480.4), "3.73 kW, 400 V star, 7.396 A, 1480 1/min"),
+        ((20e6, 11000.0, 1250.5, 1493.0), "20000 kW, 11000 V star, 1250 A, 1493 1/min"),  # no 1.1e+04 V
+    ],
+)
+def test_a_plate_is_told_to_four_digits_and_without_an_exponent(plate, said):
+    names = ("rated_power_w", "rated_voltage_v", "rated_current_a", "rated_speed_rpm")
+    assert plate_words(dict(zip(names, plate, strict=True)), "star") == said
+    assert plate_words({"rated_power_w": 2200.0}) == ""

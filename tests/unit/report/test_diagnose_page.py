@@ -12,8 +12,10 @@ from commissioner.diagnose.plant.model import NO_DICTIONARY, Model, Term
 from commissioner.diagnose.search.screening import Score, Screening
 from commissioner.diagnose.verdict.collinearity import look_alikes
 from commissioner.diagnose.verdict.residuals import residuals
+from commissioner.report import page
 from commissioner.report.diagnosis import figures
 from commissioner.report.diagnosis.numbers import limit_words, number, part_word, percent, quantity, sure
+from commissioner.report.diagnosis.sections import parameters
 from commissioner.report.diagnosis.words import headline, next_promise, next_sentence
 from commissioner.report.page import picture
 from commissioner.report.sheet.words import quantity_name
@@ -167,3 +169,25 @@ def test_dense_tones_leave_excited_lines_and_others(seen):
 
     bins = class_bins(np.arange(1.0, 60.0, 2.0), SAMPLES, PERIOD)
     assert set(bins) == {"excited"} and bins["excited"].size == 30
+
+
+@pytest.mark.parametrize(
+    ("before", "said"), [(3.0 * (1.0 + 1.25e-9), "nothing"), (3.0375, "+1.25 %"), (2.9997, "-0.0100 %")]
+)
+def test_what_the_plain_simulation_was_off_by_is_told_without_an_exponent(before, said):
+    values = {
+        "parameters_before": {"stator_resistance_ohm": {"value": before, "std": 0.01}},
+        "parameters_after": {"stator_resistance_ohm": {"value": 3.0, "std": 0.01}},
+    }
+    assert parameters({"causes": [], "kind": "standstill", **values}).parts[-1].rows[0][-1].startswith(said)
+
+
+def test_a_logarithmic_axis_of_less_than_a_decade_has_no_exponents():
+    drawn = page.figure_of(1, 1, 2.0)[1][0, 0]
+    drawn.set_yscale("log")
+    drawn.set_ylim(0.3, 3.0)
+    page.plain_decades(drawn.yaxis)
+    drawn.figure.draw_without_rendering()
+    said = [label.get_text() for label in drawn.get_yticklabels(which="both")]
+    assert {"0.5", "1", "2"} <= set(said)
+    assert not any("10" in label for label in said)

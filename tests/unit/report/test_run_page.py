@@ -144,7 +144,7 @@ def test_a_rejected_run_says_what_to_do_before_anything_else_and_no_value_looks_
 def test_a_run_that_ended_early_names_step_value_limit_and_remedy(outcome, title):
     error = {
         "what": "the flux reached its limit",
-        "step": "flux guard",
+        "step": "flux guard, axis 120 deg",
         "value": 0.884,
         "limit": 0.877,
         "unit": "Wb",
@@ -155,7 +155,7 @@ def test_a_run_that_ended_early_names_step_value_limit_and_remedy(outcome, title
         del bare[name]
     text = words(first_page(bare)[0])
     assert title in text
-    for told in ("flux guard", "0.884 Wb", "0.877 Wb", "Compare the connection with the plate."):
+    for told in ("flux guard, axis 120°", "0.884 Wb", "0.877 Wb", "Compare the connection with the plate."):
         assert told in text
 
 
@@ -298,6 +298,7 @@ def test_a_run_that_broke_off_counts_what_it_did_and_speaks_of_no_result():
     assert "Samples lost 3 of 5" in said
     assert "Uncertainty" not in said
     assert "B. Procedure, circuit" in said
+    assert text.index("Conventions") < text.index("The circuit of this report")  # in the shorter column
 
 
 def test_the_results_dot_lies_inside_its_panel_also_beyond_the_measured_curve():

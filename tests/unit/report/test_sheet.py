@@ -1,6 +1,7 @@
 """A sheet's numbers, drawings and form."""
 
 import re
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from commissioner.report.sheet.numbers import digits, fixed, held, interval, lik
         (309.08, 0.50, "309.08 ± 0.50"),
         (309.08, 0.0996, "309.08 ± 0.10"),
         (309.08, 12.3, "309 ± 12"),
+        (2345.0, 123.0, "2340 ± 120"),
         (-0.4886, 0.0049, "−0.4886 ± 0.0049"),
         (21.486, 0.0, "21.5"),
     ],
@@ -149,3 +151,9 @@ def test_a_symbol_keeps_its_index_where_a_card_names_its_columns():
     said = marks.table(columns, [("1", "3.7", "0")], "cards")
     assert '<span class="col" aria-hidden="true"><b class="n">R<sub>s</sub></b></span>3.7' in said
     assert 'data-l="Change"' in said
+
+
+def test_a_cards_label_wraps_where_its_value_must_not():
+    sheet = files("commissioner.report.sheet").joinpath("sheet.css").read_text("utf-8")
+    rule = next(line for line in sheet.splitlines() if "table.cards td[data-l]::before, table.cards .col" in line)
+    assert "white-space: normal" in rule

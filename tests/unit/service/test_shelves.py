@@ -1,5 +1,6 @@
 """Two runs beside each other and a motor over the years: what moved is told at one flux and one winding temperature."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -88,7 +89,9 @@ def test_every_verdict_of_a_comparison_has_its_words():
     assert all(f'"{one}": _(' in source for one in map(plain, Identity))
 
 
-@pytest.mark.parametrize(("language", "said"), [("en", "3.73 kW, 400 V, 7.4 A"), ("de", "3,73 kW, 400 V, 7,4 A")])
+@pytest.mark.parametrize(
+    ("language", "said"), [("en", "3.73 kW, 400 V, 7.396 A, 1420 1/min"), ("de", "3,73 kW, 400 V, 7,396 A, 1420 1/min")]
+)
 def test_a_motor_without_a_name_is_told_by_its_plate_in_the_readers_language(tmp_path, language, said):
     plate = {"rated_power_w": 3730.0, "rated_voltage_v": 400.0, "rated_current_a": 7.39629}
     make_run(tmp_path, COLD, result=result_of(COLD, MACHINE), plate=PLATE | plate)
@@ -99,3 +102,37 @@ def test_a_motor_without_a_name_is_told_by_its_plate_in_the_readers_language(tmp
 
 def test_an_unknown_motor_is_refused_in_german():
     assert words_of("de")["tell"]("there is no motor 'PUMP-7'") == "Motor 'PUMP-7' gibt es nicht"
+
+
+@pytest.mark.parametrize(
+    ("holds", "may"),
+    [
+        ("as before", False),
+        ("as before (restored)", False),
+        ("new, read back and stored", True),
+        ("old or new: read", True),
+    ],
+)
+def test_old_values_are_offered_only_where_the_drive_may_hold_others(tmp_path, holds, may):
+    make_run(tmp_path, COLD, result=result_of(COLD, MACHINE))
+    (tmp_path / COLD / "snapshot.json").write_text("{}")
+    assert replace(Archive(tmp_path).find(COLD), written=holds).can_restore is may
+
+
+@pytest.mark.parametrize(("language", "value", "half"), [("en", "4.02 Ω", "± 0.95 Ω"), ("de", "4,02 Ω", "± 0,95 Ω")])
+def test_a_recordings_values_end_where_their_intervals_end(language, value, half):
+    found = {
+        "parameters": {"stator_resistance_ohm": {"value": 4.0197, "std": 0.4832}},
+        "mean_torque_nm": {"value": 9.4583, "std": 0.3571},
+    }
+    job = SimpleNamespace(verb="monitor", files=["pump.csv"], is_done=True, failure=None, report=None)
+    shown = rendered(
+        "shelves/recording.html",
+        language,
+        job=job,
+        document=found | {"mean_speed_rad_per_s": {"value": 153.067, "std": 0.00118}},
+    )
+    said = shown.replace("&nbsp;", " ")
+    assert f'<span class="val">{value}</span>' in said and half in said
+    assert ("9.46 ± 0.70 N m" if language == "en" else "9,46 ± 0,70 N m") in said
+    assert ("1461.682 ± 0.022 1/min" if language == "en" else "1461,682 ± 0,022 1/min") in said

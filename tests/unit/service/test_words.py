@@ -87,3 +87,15 @@ def test_a_tuning_agrees_with_the_plate_only_where_it_was_compared_with_it(plate
     said = "".join(template.blocks["main"](context))
     assert "tunings agree with" in said
     assert ("agree with the plate" in said) is is_compared
+
+
+def test_a_value_in_words_has_the_readers_decimal_mark_and_a_key_keeps_its_letters():
+    german = Words(Texts("de"))
+    assert words_of("de")["short"]("6.3 ... 80 mH") == "6,3 ... 80 mH"
+    assert words_of("de")["short"]("not confirmed by the drive") == "vom Umrichter nicht bestätigt"
+    said = german.sentence("lengthen excitation.seconds, or look for noise on the current sensors")
+    assert str(said).startswith("excitation.seconds verlängern")
+    assert (
+        german.sentence("x.csv: a standstill recording needs the column segment")
+        == "x.csv: einer Aufzeichnung im Stillstand fehlt die Spalte segment"
+    )
