@@ -14,7 +14,8 @@ from commissioner.diagnose.contract import NextExperiment
 from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.diagnose.export.model_file import model_document
 from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
-from commissioner.diagnose.fit.gauss_newton import Fit, inverse
+from commissioner.diagnose.fit.gauss_newton import Fit
+from commissioner.diagnose.fit.spread import covariance_of
 from commissioner.diagnose.intake.audit import Audit, prepare
 from commissioner.diagnose.intake.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.intake.line_classes import Split, split_lines
@@ -34,7 +35,8 @@ from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
 from commissioner.diagnose.verdict.experiment import next_experiment
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
 from commissioner.errors import DataRefused
-from commissioner.motor.circuit import PARAMETERS, Quantity
+from commissioner.identify.estimate.sufficiency import WORST_RELATIVE_STD
+from commissioner.motor.circuit import PARAMETERS, SYMBOLS, Quantity
 from commissioner.records import DiagnosisVerdict, StandstillRecording
 
 NEVER_NAMEABLE = (
@@ -170,6 +172,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         causes, lack, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
     )
     experiment = next_experiment(verdict, causes, record)
+    after = _parameters(found.fit, layout)
     return Diagnosis(
         verdict,
         reason,
@@ -180,13 +183,13 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         held,
         lack,
         _parameters(found.nominal, layout),
-        _parameters(found.fit, layout),
+        after,
         experiment,
         model_document(found, [*causes, *unsure]),
         found,
         split_lines(record),
         share,
-        _remarks(noise, found, unsure),
+        (*_remarks(noise, found, unsure), *_not_fixed(after)),
         unsure,
     )
 
@@ -233,7 +236,7 @@ def _verdict(
 def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:
     """Of slow currents, as a drive controls them: what bars displace at the tones is the cause's, not R_R's and L_sigma's."""
     values, derivatives = one.model.at_rest(layout)
-    covariance = derivatives @ inverse(one.normal.total_gram) @ derivatives.T
+    covariance = derivatives @ covariance_of(one, layout) @ derivatives.T
     spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     spreads[0] = np.hypot(spreads[0], tail_of_legs(one.model, layout)[1])
     out = {n: Quantity(float(v), float(s)) for n, v, s in zip(PARAMETERS, values, spreads, strict=True)}
@@ -241,6 +244,18 @@ def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:
     t = float(values[3] / values[1])
     out["rotor_time_constant_s"] = Quantity(t, t * float(np.sqrt(max(shares @ covariance @ shares, 0.0))))
     return out
+
+
+def _not_fixed(parameters: Mapping[str, Quantity]) -> tuple[str, ...]:
+    """The sentence on those of the four that `identify` would refuse to give; none where the excitation fixes all."""
+    relative = {s: parameters[n].std / abs(parameters[n].value) for s, n in zip(SYMBOLS, PARAMETERS, strict=True)}
+    loose = [f"{s} (relative standard error {r:.0%})" for s, r in relative.items() if not r <= WORST_RELATIVE_STD]
+    if not loose:
+        return ()
+    return (
+        f"The excitation does not fix {' and '.join(loose)}, limit {WORST_RELATIVE_STD:.0%}: record again with more current, "
+        "and with more tones between the machine's poles.",
+    )
 
 
 def _not_told_apart(lines: int) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.causes import CATALOGUE, Setting
 from commissioner.diagnose.causes.setting import Sizes
-from commissioner.diagnose.fit.gauss_newton import Fit, bounded_step, fit, inverse, limits
+from commissioner.diagnose.fit.gauss_newton import Fit, bounded_step, fit, limits
+from commissioner.diagnose.fit.spread import covariance_of
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record, each_segment
 from commissioner.diagnose.plant.model import Layout, Model
@@ -183,8 +184,7 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
     """Engineering sizes with standard deviation (linear propagation of the covariance of the numbers that can move) and unit."""
     terms = found.model.terms
     free = np.flatnonzero(found.model.is_free)
-    covariance = np.zeros((4 + len(terms), 4 + len(terms)))
-    covariance[np.ix_(free, free)] = inverse(found.normal.total_gram[np.ix_(free, free)])
+    covariance = covariance_of(found, setting.layout, found.model.is_free)
     # some sizes are relative to the machine's own numbers
     rows = np.array([0, 1, 2, 3, *(4 + k for k, t in enumerate(terms) if t.effect == name and 4 + k in free)])
     sizes = _sizes(found.model, name, setting)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.fit.gauss_newton import Fit, inverse
+from commissioner.diagnose.fit.gauss_newton import Fit
+from commissioner.diagnose.fit.spread import covariance_of
 from commissioner.diagnose.plant.model import Layout
 from commissioner.motor.circuit import PARAMETERS
 
@@ -30,7 +31,7 @@ def parameter_shifts(nominal: Fit, extended: Fit, layout: Layout) -> tuple[Param
     before = np.array(nominal.model.nominal)
     after, derivatives = extended.model.at_rest(layout)
     relative = derivatives / after[:, None]
-    error = np.sqrt(np.maximum(np.diag(relative @ inverse(extended.normal.total_gram) @ relative.T), 0.0))
+    error = np.sqrt(np.maximum(np.diag(relative @ covariance_of(extended, layout) @ relative.T), 0.0))
     apart = np.abs(np.log(before / after))
     causes = list(dict.fromkeys(t.effect for t in extended.model.terms if t.effect))
     if not causes:

@@ -28,7 +28,9 @@ COMPENSATE = (
 
 
 class LegLoss(Cause):
-    """A voltage that every leg loses with the sign of its own current, a free curve over it."""
+    """A voltage that every leg loses with the sign of its own current, a free curve over it; the legs' shares of it are numbers where
+    several axes are recorded: along one a free curve takes what they do.
+    """
 
     family = "odd"
     sign = 1
@@ -44,6 +46,7 @@ class LegLoss(Cause):
         shares = tuple(
             Term(self.name, f"unequal_{leg}", "1", kinds.LEG_SHARE, k, 0.01, -MOST_UNEQUAL, MOST_UNEQUAL)
             for k, leg in ((1, "v"), (2, "w"))
+            if setting.axes > 1
         )
         return (*(Term(self.name, f"leg_{k}", "V", kind, k, 0.1, 0.0, np.inf) for k in range(count)), *shares)
 

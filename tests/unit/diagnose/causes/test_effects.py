@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
 from tests.unit.diagnose.conftest import central_slope, currents
@@ -180,6 +181,16 @@ def test_effects_the_data_cannot_show_have_no_numbers(nominal):
     assert CATALOGUE["inductance_anisotropy"].terms(single) == ()
     assert CATALOGUE["resistance_anisotropy"].terms(single) == ()
     assert CATALOGUE["device_drop"].terms(single) == ()
+
+
+def test_one_axis_has_no_shares_of_the_legs(nominal, setting):
+    """Along it v = w = 1.08 of the mean made a leg that gives voltage, and standard errors of 1e-8."""
+    from tests.unit.diagnose.conftest import setting_of
+
+    def kinds_of(one):
+        return {t.kind for t in CATALOGUE["dead_time"].terms(one)}
+
+    assert kinds_of(setting) - kinds_of(setting_of(nominal, axes=(0.0, 180.0))) == {kinds.LEG_SHARE}
 
 
 @pytest.mark.parametrize("symbol", ["loop_0", "loop_6", "loop_9", "loop_11", "split", "R_s", "L_M"])
