@@ -1,14 +1,18 @@
-"""One self-contained HTML page: headline, sections, tables, figures. No script, no font, no image from elsewhere."""
+"""What a page of a recording says: headline, sections, tables, figures; shown as one sheet."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
-from jinja2 import Environment
 from markupsafe import Markup, escape
+
+from commissioner.report.sheet import marks
+from commissioner.report.sheet.document import Margins, document
+from commissioner.report.sheet.document import Page as Sheet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,7 +67,7 @@ def told_apart(colour: str) -> Stroke:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells; a cell is shown as it stands. `tones[i]` colours row i."""
+    """Rows of cells; a cell is shown as it stands. `tones[i]` marks row i."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -79,10 +83,18 @@ class Picture:
     caption: str
 
 
-class Section:
-    """Paragraphs, tables and pictures under a title."""
+@dataclass(frozen=True)
+class Folded:
+    """Paragraphs and pictures under one line that opens them; open on paper."""
 
-    def __init__(self, title: str, *parts: str | Table | Picture) -> None:
+    summary: str
+    parts: Sequence[str | Picture]
+
+
+class Section:
+    """Paragraphs, tables, pictures and what is folded under a title."""
+
+    def __init__(self, title: str, *parts: str | Table | Picture | Folded) -> None:
         self.title, self.parts = title, parts
 
 
@@ -152,43 +164,37 @@ def with_notices_of(before: str, page: str) -> str:
 
 
 def render(page: Page) -> str:
-    """The page as HTML. Text is escaped; only pictures made by `picture` pass as markup."""
-    return _TEMPLATE.render(page=page, kind=lambda part: type(part).__name__, markup=Markup)
+    """The page as one sheet. Text is escaped; only pictures made by `picture` pass as markup."""
+    parts = [
+        _verdict(page),
+        *([marks.facts((name, Markup("<b>{}</b>").format(v)) for name, v in page.facts)] if page.facts else []),
+    ]
+    parts += (marks.section(one.title, *map(_shown, one.parts), kind="part") for one in page.sections)
+    parts.append(Markup('<div class="id"><p>{}</p><p>{}</p></div>').format(page.title, page.footer))
+    margins = Margins(page.title, "", "", "", f"commissioner {version('commissioner')}")
+    return document(page.title, margins, [Sheet("result", "Result", Markup("\n").join(parts))])
 
 
-_TEMPLATE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ page.title }}</title><style>
-:root { --ink:#1b2330; --muted:#667085; --rule:#d8dde5; --good:#2c7a4b; --warn:#a15c07; --bad:#b3261e; --plain:#1f5fa8; }
-* { box-sizing:border-box } body { font:15px/1.5 system-ui,"DejaVu Sans",sans-serif; color:var(--ink); background:#f4f6f9; margin:0 }
-main { max-width:1020px; margin:0 auto; padding:28px 20px 60px }
-header,section { background:#fff; border:1px solid var(--rule); border-radius:10px; padding:20px 26px; margin:0 0 16px }
-.notice { border-left:6px solid var(--warn); font-weight:600 } .notice p { margin:0 }
-header { border-top:6px solid var(--{{ page.tone }}) } h1 { font-size:15px; color:var(--muted); margin:0 0 6px; font-weight:600 }
-.headline { font-size:22px; line-height:1.3; font-weight:650; margin:0 0 14px } h2 { font-size:17px; margin:0 0 10px }
-dl { display:grid; grid-template-columns:repeat(auto-fit,minmax(170px,1fr)); gap:10px 22px; margin:0 }
-dt { color:var(--muted); font-size:12.5px } dd { margin:0; font-weight:600; font-variant-numeric:tabular-nums }
-table { border-collapse:collapse; width:100%; font-variant-numeric:tabular-nums; margin:6px 0 12px; font-size:14px }
-th { text-align:left; color:var(--muted); font-weight:600; border-bottom:2px solid var(--rule); padding:5px 10px 5px 0; vertical-align:bottom }
-td { border-bottom:1px solid var(--rule); padding:5px 10px 5px 0; vertical-align:top } caption { caption-side:bottom; text-align:left; color:var(--muted); font-size:13px; padding-top:4px }
-tr.good td:first-child { box-shadow:inset 3px 0 var(--good); padding-left:10px } tr.warn td:first-child { box-shadow:inset 3px 0 var(--warn); padding-left:10px }
-tr.bad td:first-child { box-shadow:inset 3px 0 var(--bad); padding-left:10px } figure { margin:8px 0 16px } figure svg,figure img { width:100%; height:auto }
-figcaption { color:var(--muted); font-size:13px } p { margin:0 0 10px; max-width:80ch } footer { color:var(--muted); font-size:12.5px }
-.wide { overflow-x:auto } @media print { body { background:#fff; font-size:12px } header,section { border-color:#bbb; padding:12px 16px; margin-bottom:10px } main { padding:0 }
-  .headline { font-size:18px } h2 { font-size:14px } table,caption,figcaption,footer,dt { font-size:11px } figure { margin:4px 0 8px }
-  header,figure,tr,section:not(:has(figure,table)) { break-inside:avoid } h2,thead { break-after:avoid }
-  summary,p:has(+ figure) { break-after:avoid } .wide { overflow:visible } summary { list-style:none; font-weight:600 } details::details-content { content-visibility:visible; display:block } }
-</style></head><body><main>
-<header><h1>{{ page.title }}</h1><p class="headline">{{ page.headline }}</p>
-<dl>{% for name, value in page.facts %}<div><dt>{{ name }}</dt><dd>{{ value }}</dd></div>{% endfor %}</dl></header>
-{% for section in page.sections %}<section><h2>{{ section.title }}</h2>
-{% for part in section.parts %}
-{% if kind(part) == "Table" %}<div class="wide"><table>{% if part.caption %}<caption>{{ part.caption }}</caption>{% endif %}
-<thead><tr>{% for cell in part.header %}<th scope="col">{{ cell }}</th>{% endfor %}</tr></thead><tbody>
-{% for row in part.rows %}<tr class="{{ part.tones[loop.index0] if part.tones else 'plain' }}">{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
-{% endfor %}</tbody></table></div>
-{% elif kind(part) == "Picture" %}<figure>{{ markup(part.markup) }}<figcaption>{{ part.caption }}</figcaption></figure>
-{% else %}<p>{{ part }}</p>
-{% endif %}{% endfor %}</section>
-{% endfor %}<footer>{{ page.footer }}</footer></main></body></html>
-""")
+def _verdict(page: Page) -> Markup:
+    title = Markup("<h1>{}</h1>").format(page.headline)
+    if page.tone == "plain":
+        return title
+    kind, mark = {"good": ("ok", marks.GOOD), "warn": ("warn", marks.WARN), "bad": ("bad", marks.BAD)}[page.tone]
+    return Markup('<div class="verdict"><span class="{}" style="display:contents">{}</span>{}</div>').format(
+        kind, mark, title
+    )
+
+
+def _shown(part: str | Table | Picture | Folded) -> Markup:
+    match part:
+        case Table():
+            columns = [marks.Column(name) for name in part.header]
+            return marks.table(columns, part.rows, tones=part.tones, caption=part.caption)
+        case Picture():
+            return marks.figure(
+                "", Markup('<div class="plot" tabindex="0">{}</div>').format(Markup(part.markup)), part.caption
+            )
+        case Folded():
+            inside = Markup("").join(map(_shown, part.parts))
+            return Markup('<details class="part"><summary>{}</summary>{}</details>').format(part.summary, inside)
+    return marks.paragraph(part)

@@ -25,6 +25,7 @@ class Entry:
     run: str
     utc: str
     motor: str
+    motor_names: tuple[str, ...]
     motor_text: str
     drive: str
     person: str
@@ -140,6 +141,7 @@ def _read_entry(folder: Path) -> Entry:
         summary.run,
         utc_of(summary.run),
         str(origin.get("motor", "")),
+        summary.motor_names,
         plate_words(plate),
         summary.drive,
         str(origin.get("person", "")),
@@ -156,7 +158,10 @@ def _read_entry(folder: Path) -> Entry:
 
 def _matches(entry: Entry, motor: str, drive: str, outcome: str, since: str) -> bool:
     return (
-        (not motor or motor.lower() in f"{entry.motor} {entry.motor_text} {entry.drive} {entry.run}".lower())
+        (
+            not motor
+            or motor.lower() in f"{' '.join(entry.motor_names)} {entry.motor_text} {entry.drive} {entry.run}".lower()
+        )
         and (not drive or drive.lower() in entry.drive.lower())
         and (not outcome or outcome in (entry.outcome, entry.standing))
         and (not since or entry.utc[: len(since)] >= since)

@@ -170,7 +170,7 @@ def runs_motors(
 
 @runs_app.command("trend")
 def runs_trend(
-    motor: Annotated[str | None, typer.Argument(help="The motor's tag or serial number.")] = None,
+    motor: Annotated[str | None, typer.Argument(help="The motor's tag, serial number or file name.")] = None,
     baseline: Annotated[
         Path | None, typer.Option("--baseline", help="Indicators of this baseline of `monitor`.")
     ] = None,

@@ -72,7 +72,7 @@ def list_motors(archive: Archive) -> tuple[Motor, ...]:
 
 
 def runs_of(archive: Archive, motor: str) -> tuple[Row, ...]:
-    """A motor's runs, newest first, by tag or serial number as they were given. UsageError: there is none."""
+    """A motor's runs, newest first, by tag, serial number or its plate's name, as they were given. UsageError: there is none."""
     rows = rows_of(archive.runs, motor, archive.database)
     if not rows:
         known = [found.motor for found in list_motors(archive) if found.motor]

@@ -10,8 +10,7 @@ from commissioner.diagnose.verdict.residuals import Residuals
 from commissioner.report.diagnosis import figures
 from commissioner.report.diagnosis.names import class_name, spoken
 from commissioner.report.diagnosis.words import Document
-from commissioner.report.folded import folded
-from commissioner.report.page import Picture, Section, picture
+from commissioner.report.page import Folded, Picture, Section, picture
 from commissioner.report.sheet.marks import capitalised
 
 
@@ -82,13 +81,13 @@ def for_experts(document: Document, left: Residuals, has_causes: bool, alike: Al
         for c in document["causes"]
     ]
     never = "; ".join(s.replace(" | ", ", or ") for s in document["cannot_tell"])
-    parts = [folded("Which causes look alike in this recording", same)] if same else []
-    parts.append(folded("The error's tie to the voltage, and levels before any model", tie))
+    parts = [Folded("Which causes look alike in this recording", same)] if same else []
+    parts.append(Folded("The error's tie to the voltage, and levels before any model", tie))
     if shown:
-        parts.append(folded("How the named causes show, and sources", shown))
+        parts.append(Folded("How the named causes show, and sources", shown))
     if never:
         parts.append(
-            folded(
+            Folded(
                 "What no test at standstill tells apart",
                 [f"Never told apart at the terminals of a motor at standstill: {never}."],
             )

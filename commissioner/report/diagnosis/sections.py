@@ -19,7 +19,6 @@ from commissioner.report.diagnosis.words import (
     of_cause,
     ordered,
     remarks,
-    tone,
 )
 from commissioner.report.page import Section, Table, Tone
 from commissioner.report.sheet.marks import coded
@@ -41,7 +40,7 @@ NAMES = (
 def what_it_means(document: Document) -> list[Section]:
     """The paragraphs under the headline and up to three rows of what to do."""
     rows = [(who.replace(" ", "\u00a0"), coded(what)) for who, what in actions(document)]
-    table = [Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else []
+    table = [Table(("", "what to do"), rows)] if rows else []
     words = [coded(s) for s in (*meaning(document), *remarks(document))]
     return [Section("What it means", *words, *table)] if words or table else []
 

@@ -37,7 +37,7 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
         Section(
             "What it means",
             *meaning(document),
-            *([Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else []),
+            *([Table(("", "what to do"), rows)] if rows else []),
         )
     ]
     if seen.found is not None:

@@ -39,7 +39,9 @@ class Margins:
 
 def document(title: str, margins: Margins, pages: Sequence[Page]) -> str:
     """The whole text. Nothing is loaded from elsewhere; fonts lie inside."""
-    links = Markup("").join(Markup('<a href="#{}">{}</a>').format(page.anchor, page.title) for page in pages)
+    links = Markup("").join(
+        Markup('<a href="#{}">{}</a>').format(page.anchor, page.title) for page in pages if len(pages) > 1
+    )
     kick = Markup('<p class="kick"><span>{}</span><span class="sim">{}</span><span>{}</span></p>').format(
         margins.subject, margins.middle, margins.run
     )
@@ -62,7 +64,7 @@ def document(title: str, margins: Margins, pages: Sequence[Page]) -> str:
 def _style(margins: Margins) -> str:
     boxes = {
         "top-left": _quoted(_cut(margins.subject, 54)), "top-center": _quoted(_cut(margins.middle, 28)),
-        "top-right": f'{_quoted(_cut(margins.run, 36) + " · page ")} counter(page) " of " counter(pages)',
+        "top-right": f'{_quoted(" · ".join(filter(None, (_cut(margins.run, 36), "page "))))} counter(page) " of " counter(pages)',
         "bottom-left": _quoted(margins.below_left), "bottom-right": _quoted(margins.below_right),
     }  # fmt: skip
     texts = " ".join(f"@{name} {{ content: {text} }}" for name, text in boxes.items())

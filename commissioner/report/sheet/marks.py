@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from markupsafe import Markup, escape
 
@@ -27,6 +28,10 @@ GOOD = Markup(
 BAD = Markup(
     '<svg viewBox="0 0 20 20" aria-hidden="true"><path d="M6.3 1h7.4L19 6.3v7.4L13.7 19H6.3L1 13.7V6.3z" fill="currentColor"/>'
     '<path d="M6.5 6.5l7 7M13.5 6.5l-7 7" stroke="#fff" stroke-width="2"/></svg>'
+)
+WARN = Markup(
+    '<svg viewBox="0 0 20 20" aria-hidden="true"><path d="M10 2L18.6 17.5H1.4z" fill="none" stroke="currentColor" stroke-width="1.6" stroke-linejoin="round"/>'
+    '<path d="M10 7.5v5M10 14v1.8" stroke="currentColor" stroke-width="2"/></svg>'
 )
 UNDONE = Markup(
     '<svg viewBox="0 0 20 20" aria-hidden="true"><circle cx="10" cy="10" r="8.5" fill="none" stroke="currentColor" stroke-width="1.6" '
@@ -88,9 +93,7 @@ def unchecked(items: Sequence[Text]) -> Markup:
 
 
 def section(title: Text, *parts: Text, kind: str = "", level: int = 2) -> Markup:
-    head = Markup("<section{}><h{}>{}</h{}>").format(
-        Markup(' class="{}"').format(kind) if kind else "", level, title, level
-    )
+    head = Markup("<section{}><h{}>{}</h{}>").format(_of_class(kind), level, title, level)
     return head + Markup("").join(parts) + Markup("</section>")
 
 
@@ -99,27 +102,42 @@ def side_by_side(*parts: Markup, columns: int = 2) -> Markup:
 
 
 def paragraph(text: Text, kind: str = "") -> Markup:
-    return Markup('<p class="{}">{}</p>').format(kind, text) if kind else Markup("<p>{}</p>").format(text)
+    return Markup("<p{}>{}</p>").format(_of_class(kind), text)
 
 
-def table(columns: Sequence[Column], rows: Iterable[Sequence[Text]], kind: str = "cards") -> Markup:
-    """The first cell of a row names it. `cards`: on a narrow screen each row becomes a card; `keep`: it stays a table."""
+def table(
+    columns: Sequence[Column],
+    rows: Iterable[Sequence[Text]],
+    kind: str = "cards",
+    tones: Sequence[str] = (),
+    caption: Text = "",
+) -> Markup:
+    """The first cell of a row names it. `cards`: on a narrow screen each row becomes a card; `keep`: it stays a table. `tones[i]` marks
+    row i."""
     head = Markup("").join(
         Markup('<th scope="col"{}>{}</th>').format(_aligned(column), column.name) for column in columns
     )
     body = Markup("").join(
-        Markup("<tr>{}</tr>").format(
+        Markup("<tr{}>{}</tr>").format(
+            _of_class(tone),
             Markup("").join(
                 _cell(column, cell, is_first=k == 0) for k, (column, cell) in enumerate(zip(columns, row, strict=True))
-            )
+            ),
         )
-        for row in rows
+        for row, tone in zip_longest(rows, tones)
     )
-    return Markup('<table class="{}"><thead><tr>{}</tr></thead><tbody>{}</tbody></table>').format(kind, head, body)
+    above = Markup("<caption>{}</caption>").format(caption) if caption else Markup("")
+    return Markup('<table class="{}">{}<thead><tr>{}</tr></thead><tbody>{}</tbody></table>').format(
+        kind, above, head, body
+    )
+
+
+def _of_class(kind: str | None) -> Markup:
+    return Markup(' class="{}"').format(kind) if kind else Markup("")
 
 
 def _aligned(column: Column) -> Markup:
-    return Markup(' class="r"') if column.right else Markup("")
+    return _of_class("r" if column.right else None)
 
 
 def _cell(column: Column, cell: Text, *, is_first: bool) -> Markup:
@@ -130,14 +148,16 @@ def _cell(column: Column, cell: Text, *, is_first: bool) -> Markup:
         return Markup('<td{}><span class="col" aria-hidden="true">{}</span>{}</td>').format(
             _aligned(column), name, cell
         )
-    return Markup('<td{} data-l="{}">{}</td>').format(_aligned(column), name, cell)
+    label = Markup(' data-l="{}"').format(name) if name else Markup("")
+    return Markup("<td{}{}>{}</td>").format(_aligned(column), label, cell)
 
 
 def figure(title: Text, drawings: Text, caption: Text = "", aside: Text = "") -> Markup:
-    """A drawing with its title above and what to see in it below."""
+    """A drawing with its title (or none) above and what to see in it below."""
     side = Markup('<span class="small">{}</span>').format(aside) if aside else Markup("")
     below = Markup("<figcaption>{}</figcaption>").format(caption) if caption else Markup("")
-    return Markup("<figure><header><h3>{}</h3>{}</header>{}{}</figure>").format(title, side, drawings, below)
+    above = Markup("<header><h3>{}</h3>{}</header>").format(title, side) if title else Markup("")
+    return Markup("<figure>{}{}{}</figure>").format(above, drawings, below)
 
 
 def multiples(panels: Iterable[tuple[Text, Markup]], columns: int) -> Markup:

@@ -25,6 +25,11 @@ STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, "rejected", "aborted", "f
 """How a run can have ended, or stand."""
 
 
+def motor_names(summary: Mapping[str, Any]) -> tuple[str, ...]:
+    """What names a run's motor, each alone: its tag, its serial number, the name its plate was given under."""
+    return tuple(name for key in ("motor_tag", "motor_serial", "motor_name") if (name := summary.get(key)))
+
+
 @dataclass(frozen=True)
 class RunSummary:
     """`written` says which parameter set the drive holds after the run, as far as the run could know. `motor`: the plate;
@@ -57,6 +62,11 @@ class RunSummary:
     def motor_id(self) -> str:
         """The motor's tag, or its serial number; empty where nobody said which motor it is."""
         return self.motor_tag or self.motor_serial
+
+    @property
+    def motor_names(self) -> tuple[str, ...]:
+        """Each names the run's motor."""
+        return motor_names(vars(self))
 
     @property
     def standing(self) -> str:

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 from commissioner.encoding import plain
 from commissioner.motor.quantities import plate_words
-from commissioner.run.archive.summary import NOT_KEPT, OLD_OR_NEW, RunSummary
+from commissioner.run.archive.summary import NOT_KEPT, OLD_OR_NEW, RunSummary, motor_names
 
-SCHEMA = 1
-"""Of a SQLite index; one of another number is built anew from the folders."""
+SCHEMA = 2
+"""Of an index, raised with every change of what a row holds; an earlier one is filled anew from the folders."""
 CREATE = (
     "CREATE TABLE runs (place TEXT NOT NULL, run TEXT NOT NULL, folder TEXT NOT NULL, journal_bytes BIGINT NOT NULL, "
     "journal_mtime_ns BIGINT NOT NULL, started_utc TEXT NOT NULL, outcome TEXT NOT NULL, standing TEXT NOT NULL, "
@@ -48,6 +48,11 @@ class Row(NamedTuple):
     motor_serial: str
     plate: str
     document: str
+
+    @property
+    def motor_names(self) -> tuple[str, ...]:
+        """Of the summary."""
+        return motor_names(json.loads(self.document))
 
 
 COLUMNS = ", ".join(Row._fields)

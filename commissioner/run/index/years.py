@@ -39,9 +39,8 @@ def seconds(utc: str) -> float:
 
 
 def rows_of(root: Path, motor: str, database: str | None = None) -> list[Row]:
-    """A motor's runs, newest first, by tag or serial number as they were given."""
-    rows = find(root, Wanted(motor=motor), database).rows
-    return [row for row in rows if motor in (row.motor, row.motor_serial)]
+    """A motor's runs, newest first, by tag, serial number or the name of its plate, as they were given."""
+    return [row for row in find(root, Wanted(motor=motor), database).rows if motor in row.motor_names]
 
 
 def _earlier(root: Path, newest: RunSummary) -> list[RunSummary]:

@@ -60,7 +60,7 @@ async def trend(request: Request, motor: str, _who: Viewer) -> TrendDocument:
 def trend_of(parts: Parts, motor: str) -> TrendDocument:
     """The points, and of each parameter the change from the first to the last as the two are compared. Unknown: no motor is called so, and
     none of the archive was."""
-    runs = [e for e in parts.archive.entries(motor=motor, limit=1000) if e.motor == motor]
+    runs = [e for e in parts.archive.entries(motor=motor, limit=1000) if motor in e.motor_names]
     if not runs:
         parts.library.motor(motor)
     entries = [e for e in runs if e.outcome == "commissioned"]

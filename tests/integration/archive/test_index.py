@@ -198,6 +198,28 @@ def test_an_index_of_another_version_is_made_anew(root):
     assert len(stored(root, None)) == 40
 
 
+def test_a_plate_in_the_words_of_an_earlier_version_is_told_in_todays(root, database):
+    """As an index of version 1 has it: the folders have not changed, its words have."""
+    refresh(root, database)
+    run = by_folders(root)[3]
+    earlier = "UPDATE runs SET plate = '4 kW, 1420 rpm' WHERE run = :run"
+    if database is None:
+        with sqlite3.connect(root / NAME) as connection:
+            connection.execute(earlier, {"run": run})
+            connection.execute("PRAGMA user_version = 1")
+    else:
+        from sqlalchemy import create_engine, text
+
+        shared = create_engine(database)
+        with shared.begin() as connection:
+            connection.execute(text(earlier), {"run": run})
+            connection.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+        shared.dispose()
+    (row,) = [row for row in find(root, Wanted(), database).rows if row.run == run]
+    assert "1/min" in row.plate and "rpm" not in row.plate
+    assert not find(root, Wanted(text="rpm"), database).rows
+
+
 def test_a_value_changed_in_the_index_is_found_by_verify_and_mended_by_a_rebuild(root):
     refresh(root)
     run = by_folders(root)[3]

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 import commissioner
-from commissioner.report.folded import folded
-from commissioner.report.page import Page, Section, render
+from commissioner.report.page import Folded, Page, Picture, Section, Table, render
 
 ROOT = Path(commissioner.__file__).parent
 ONLY_ON_A_SCREEN = re.compile(
@@ -43,6 +42,23 @@ def test_no_sentence_of_a_report_names_a_colour_or_asks_for_a_pointer(path):
 
 
 def test_what_is_folded_on_the_screen_is_open_on_paper():
-    page = render(Page("t", "h", "good", (), [Section("For experts", folded("more", ["the rest"]))]))
+    page = render(Page("t", "h", "good", (), [Section("For experts", Folded("more", ["the rest"]))]))
     on_paper = page.partition("@media print")[2].partition("</style>")[0]
-    assert "details::details-content" in on_paper and "content-visibility:visible" in on_paper
+    assert "details::details-content" in on_paper and "content-visibility: visible" in on_paper
+
+
+def test_a_recordings_page_is_a_sheet_whose_tables_fold_and_whose_figures_keep_their_letters_on_a_phone():
+    """9 pt drawn 662 pt wide: on 360 px they were 4 px high; 48 rem is 720 px, where they are 10 px."""
+    table = Table(("what repeats", "frequency / Hz", ""), [("shaft", "24.36", "1<2")], ["warn"], "a caption")
+    text = render(Page("t", "h", "warn", [("slip", "2 %")], [Section("s", table, Picture("<svg></svg>", "seen"))]))
+    body = text.partition("<main>")[2]
+    assert '<table class="cards"><caption>a caption</caption>' in body
+    assert (
+        '<tr class="warn"><th scope="row">shaft</th><td data-l="frequency / Hz">24.36</td><td>1&lt;2</td></tr>' in body
+    )
+    assert '<figure><div class="plot" tabindex="0"><svg></svg></div><figcaption>seen</figcaption></figure>' in body
+    assert "<dt>slip</dt><dd><b>2 %</b></dd>" in body
+    on_a_phone = text.partition("@media screen and (max-width: 760px)")[2].partition("</style>")[0]
+    assert ".plot { overflow-x: auto; } .plot > :is(svg, img) { min-width: 48rem; }" in on_a_phone
+    assert 'content: "page " counter(page)' in text
+    assert '<nav class="bar" aria-label="Parts of the report"><b>t</b></nav>' in text

@@ -120,9 +120,10 @@ def test_a_printed_card_breaks_between_its_figures_and_no_heading_stands_alone()
     """A section that may not break leaves most of the page before it blank."""
     text = page.render(page.Page("t", "h", "plain", [], [page.Section("s", page.Table(("a",), [("1",)]))]))
     printed = text[text.index("@media print") :].partition("</style>")[0]
-    assert "header,figure,tr,section:not(:has(figure,table)) { break-inside:avoid }" in printed
-    assert "h2,thead { break-after:avoid }" in printed
-    assert "section { break-inside" not in printed
+    assert ".part:not(:has(figure, table)) { break-inside: avoid; }" in printed
+    assert "p:has(+ figure), summary, thead { break-after: avoid; }" in printed
+    assert "h2, h3, h4, .lead { break-after: avoid; }" in printed
+    assert re.search(r"\.part \{[^}]*break-inside", printed) is None
     assert '<th scope="col">a</th>' in text
 
 

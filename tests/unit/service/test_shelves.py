@@ -7,8 +7,11 @@ import pytest
 from jinja2 import ChoiceLoader, DictLoader
 
 from commissioner.encoding import plain
+from commissioner.errors import UsageError
 from commissioner.identify.estimate.axes import Identity
 from commissioner.operations.history.compare import compare_runs
+from commissioner.operations.history.runs import Archive as Runs
+from commissioner.operations.history.trend import trend
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.archive import Archive
 from commissioner.service.page.frame import environment, words_of
@@ -39,6 +42,19 @@ def test_a_warmer_winding_is_no_change_of_the_motor(tmp_path, rotor, moved):
     assert {name for name, change in changes.items() if change["is_beyond_chance"]} == moved
     assert changes["stator_resistance_ohm"]["relative"] == pytest.approx(0.0, abs=1e-3)
     assert changes["rotor_resistance_ohm"]["relative"] == pytest.approx(rotor - 1.0, abs=1e-3)
+
+
+def test_a_trend_is_found_by_the_motors_file_tag_or_serial_number_on_the_page_as_on_the_command_line(tmp_path):
+    names = {"motor": "pump", "motor_tag": "PUMP-7", "motor_serial": "SN 77"}
+    for name in (COLD, WARM):
+        make_run(tmp_path, name, result=result_of(name, MACHINE), origin=names)
+    parts = SimpleNamespace(archive=Archive(tmp_path))
+    for asked in names.values():
+        assert [point["run"] for point in trend_of(parts, asked)["points"]] == [COLD, WARM]
+        assert [point.run for point in trend(Runs(tmp_path), asked).found.trends[0].points] == [COLD, WARM]
+    with pytest.raises(UsageError):
+        trend(Runs(tmp_path), "PUMP")
+    assert [entry.run for entry in parts.archive.entries(motor="pump-7")] == [WARM, COLD]
 
 
 def rendered(name, language, **facts):

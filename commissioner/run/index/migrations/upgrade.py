@@ -6,7 +6,9 @@ from pathlib import Path
 
 from sqlalchemy import Engine, inspect, text
 
-HEAD = "0001"
+from commissioner.run.index.rows import SCHEMA
+
+HEAD = f"{SCHEMA:04}"
 _LOCK = 0x636F6D6D
 """An advisory lock of PostgreSQL, so that one of several computers makes the tables."""
 
