@@ -160,7 +160,7 @@ class PartialMonitoring(TypedDict):
 
 
 class State(TypedDict):
-    """A stretch of the recording: off | residual | standstill | lost | start | ramp | voltage dip | load step | steady | coast-down; `used`: the answer is of it.
+    """A stretch of the recording: off | residual | standstill | lost | start | ramp | voltage dip | voltage step | load step | steady | coast-down; `used`: the answer is of it.
     Of a steady stretch beside it, or one that is too short, its own speed and torque; `withheld`: why they are of the terminals
     and the plate only."""
 

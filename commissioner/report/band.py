@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 COLOURS = {
     "off": "#d8dde5", "residual": "#b9c2cf", "standstill": "#8fa3bf", "start": "#e69f00", "ramp": "#f0c25c",
-    "voltage dip": "#9c6b30", "load step": "#cc79a7", "steady": "#5fb59b", "coast-down": "#7aa6d8", "lost": "#d1495b",
+    "voltage dip": "#9c6b30", "voltage step": "#c9a227", "load step": "#cc79a7", "steady": "#5fb59b", "coast-down": "#7aa6d8", "lost": "#d1495b",
 }  # fmt: skip
 LEAST_NAMED = 0.05
 """Of the width: a narrower stretch stands without its name."""

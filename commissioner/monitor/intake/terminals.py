@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from commissioner.monitor.intake.findings import Fundamental
+import numpy as np
+
+from commissioner.monitor.intake.findings import Audited, Fundamental
+from commissioner.monitor.signals.quiet import wander
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate
 
 RESISTANCE_STD, SLIP_STD, IRON_STD = 0.4, 0.25, 0.02
 """Relative: of the plate's stator resistance, of slip over torque (tolerance of IEC 60034-1 and temperature), and of the
 apparent power for iron loss (which light load does not lower) and sensors."""
+LEVEL_S, LEVEL_PERIODS = 0.1, 3.0
+"""Over which the power has a level: seconds, and supply periods where these are longer (an unbalance pulses with twice the supply)."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +29,18 @@ class Terminals:
     speed_std_rad_per_s: float
 
 
-def from_terminals(seen: Fundamental | None, plate: Nameplate) -> Terminals | None:
-    """T = (P - 3 R_s I^2) / (omega / p), and the slip that this torque has by the plate; None where no machine draws so."""
+def power_wander_w(audited: Audited) -> float:
+    """rms of the power's level within the stretch around its mean: a load that drifts or swings; zero where nothing is known."""
+    seen, power = audited.fundamental, 1.5 * np.real(audited.voltage_v * np.conj(audited.current_a))
+    if seen is None or not seen.frequency_hz > 0.0:
+        return 0.0
+    level_s = max(LEVEL_S, LEVEL_PERIODS / seen.frequency_hz)
+    return wander(power, max(round(level_s / audited.sample_period_s), 1))
+
+
+def from_terminals(seen: Fundamental | None, plate: Nameplate, wander_w: float = 0.0) -> Terminals | None:
+    """T = (P - 3 R_s I^2) / (omega / p), and the slip that this torque has by the plate; None where no machine draws so. `wander_w`:
+    rms of the power's movement within the stretch, which no mean tells."""
     if seen is None:
         return None
     apparent = math.hypot(seen.power_w, seen.reactive_var)
@@ -37,7 +52,7 @@ def from_terminals(seen: Fundamental | None, plate: Nameplate) -> Terminals | No
     volts = math.sqrt(1.5) * abs(seen.voltage_v)
     rated_apparent = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a
     of_iron = IRON_STD * max(apparent, rated_apparent * (volts / plate.rated_voltage_v) ** 2)
-    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron) / synchronous
+    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron, wander_w) / synchronous
     rated_nm = plate.rated_power_w / (plate.rated_speed_rpm * math.pi / 30.0)
     flux, rated_flux = volts / seen.frequency_hz, plate.rated_voltage_v / plate.rated_frequency_hz
     drop = plate.rated_slip * 2.0 * math.pi * plate.rated_frequency_hz / plate.pole_pairs * torque / rated_nm

@@ -25,6 +25,12 @@ SAME_LEVEL, SAME_LEVEL_OF_APPARENT = 0.02, 0.004
 SAME_VARIATION = 1.3
 
 
+def wander(power: Signal, block: int) -> float:
+    """rms of the mean over `block` samples around the mean of all: a load that drifts, or swings more slowly than that."""
+    count = power.size // max(block, 1)
+    return float(np.std(power[: count * block].reshape(count, block).mean(axis=1))) if count > 1 else 0.0
+
+
 def quietest(frame: TurningFrame) -> slice:
     """The stretch of `SEGMENT_S` with the least rms variation of instantaneous power, grown while it stays as quiet.
 

@@ -111,7 +111,7 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | P
     wishes = Wishes(request.load_hz, request.inertia_kg_m2, start, trust=trust_from(request.trust))
     seen, recording, stretches = in_its_states(recording, plate, wishes)
     if isinstance(seen, Refused):
-        part = said_by_terminals(seen, stretches)
+        part = said_by_terminals(seen, stretches, plate)
         if part is not None:
             return PartlyMonitored(partial_document(part, stretches, seen.audited))
         return _refused(seen, request.file, stretches)

@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import cast
 
+import numpy as np
+
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.against_plate import against_plate, doubt_of, of_contradiction, over_currents
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.channels import Wiring
-from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
-from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.monitor.intake.terminals import from_terminals, power_wander_w
 from commissioner.monitor.loads.pairing_by_start import wired_in
 from commissioner.monitor.partial import Partial, of_terminals, refused_audit
 from commissioner.motor.circuit import Quantity
@@ -110,7 +112,8 @@ def _add_own(state: State, seen: Observation | Refused, plate: Nameplate) -> Non
         return
     of_terminals_alone = seen.reason.code in SHORT | SILENT
     state["withheld"] = ("from current, voltage and plate only: " if of_terminals_alone else "") + seen.reason.what
-    terminal = from_terminals(seen.audited.fundamental, plate) if of_terminals_alone else None
+    wander = power_wander_w(seen.audited)
+    terminal = from_terminals(seen.audited.fundamental, plate, wander) if of_terminals_alone else None
     if terminal is not None:
         state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
@@ -127,7 +130,19 @@ def longest_steady(
     return cut_out(recording, longest, MARGIN_S if longest.duration_s > 3.0 * MARGIN_S else 0.0), longest
 
 
-def said_by_terminals(seen: Refused, stretches: list[State]) -> Partial | None:
+def _load_moves(audited: Audited, plate: Nameplate) -> Finding | None:
+    """Where a load that drifts or swings is as much of the stated deviation as all that terminals do not know."""
+    still, stated = (from_terminals(audited.fundamental, plate, w) for w in (0.0, power_wander_w(audited)))
+    if still is None or stated is None or stated.torque_std_nm < np.sqrt(2.0) * still.torque_std_nm:
+        return None
+    moves = float(np.sqrt(stated.torque_std_nm**2 - still.torque_std_nm**2))
+    return Finding(
+        "load_moves", "note", f"the load moves by {moves:.2g} N m (rms) within the stretch: that is in the torque's standard deviation",
+        moves, still.torque_std_nm, "record at steady load",
+    )  # fmt: skip
+
+
+def said_by_terminals(seen: Refused, stretches: list[State], plate: Nameplate) -> Partial | None:
     """Of a recording whose steady stretches are too short or too even for the chain: what the terminals say of the longest."""
     told = [s for s in stretches if s["state"] == "steady" and "mean_torque_nm" in s]
     if seen.reason.code not in SHORT | SILENT or not told:
@@ -144,11 +159,12 @@ def said_by_terminals(seen: Refused, stretches: list[State]) -> Partial | None:
         withheld["from other states"] = (
             f"{unused}: `identify` and `diagnose` use a start, a ramp or a load step, this verb does not"
         )
+    moves = _load_moves(seen.audited, plate)
     f = seen.audited.fundamental
     indicators = {} if f is None else of_terminals(f)
     return Partial(
         Quantity(speed["value"], speed["std"] or 0.0), Quantity(torque["value"], torque["std"] or 0.0), best["frequency_hz"],
-        (), indicators, withheld,
+        (), indicators, withheld, () if moves is None else (moves,),
     )  # fmt: skip
 
 

@@ -1,20 +1,24 @@
-"""What each window of levels is called: off, residual, standstill, start, ramp, voltage dip, load step, steady, coast-down."""
+"""What each window of levels is called: off, residual, standstill, start, ramp, voltage dip, voltage step, load step, steady, coast-down."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from commissioner.monitor.intake.states.windows import HOPS, Levels
+from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import Signal
 
 RESIDUAL_VOLTAGE = 0.03
 """Of the rated voltage, from which on a motor without current still has flux: it coasts."""
-FAST_CHANGE = 0.12
-"""Of the supply frequency, within half a second, that makes a ramp."""
-STEP = 0.15
+FAST_CHANGE, SLOW_CHANGE = 0.12, 0.02
+"""Of the supply frequency, within half a second, that makes a ramp; within a second where the voltages carry it: they do not swing with
+the load."""
+STEP = 0.08
 """Of the current's level, between two sides that are each constant within `STEADIER` of it: a slow swing's are no better than 0.3."""
 STEADIER = 0.25
+"""Less where the change takes as long as the sides are looked at: the crests of a swing are level too."""
 SETTLED = 0.08
 """Of the level that follows, within which a start's current has come down."""
 START_CURRENT = 2.0
@@ -22,8 +26,12 @@ START_CURRENT = 2.0
 follows it."""
 STANDING = 0.02
 """Of the rated frequency: a slower vector is direct current."""
-LEAST_STEADY_S, STEP_SIDE_S = 0.4, 1.0
+LEAST_STEADY_S, STEP_SIDES_S = 0.4, (1.0, 0.6)
 """What is steady, and how far to each side of a step the level is looked at."""
+FLAT = 0.02
+"""Of the step: sides that vary less are as level as any, and the shorter change is taken."""
+CHANGES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0)
+"""How long a load may take from one level to the next."""
 DIP, LONGEST_DIP_S, SAME_FREQUENCY = 0.12, 1.0, 0.02
 """A voltage that is lower by this share than that of a second before and after, at the same frequency."""
 OFF_CURRENT = 0.05
@@ -58,18 +66,37 @@ def named(levels: Levels, plate: Nameplate) -> list[str]:
 
 def _name_ramps(levels: Levels, idle: np.ndarray, names: list[str]) -> None:
     half = max(round(0.25 / levels.hop_s), 1)
-    for k in range(len(names)):
-        a, b = max(k - half, 0), min(k + half, len(names) - 1)
-        if idle[a : b + 1].any():
-            continue
-        change = abs(levels.frequency_hz[b] - levels.frequency_hz[a]) / max(levels.frequency_hz[a : b + 1].max(), 1e-9)
-        if change > FAST_CHANGE * (b - a) / (2 * half) or levels.sense[a] != levels.sense[b]:
-            names[k] = "ramp"
+    hertz, last = levels.frequency_hz, len(names) - 1
+    before, behind = (np.clip(np.arange(last + 1) + k, 0, last) for k in (-half, half))
+    share = FAST_CHANGE * (behind - before) / (2 * half)
+    is_ramp = _moved(hertz, before, behind, share) | (levels.sense[before] != levels.sense[behind])
+    is_near_idle = maximum_filter1d(idle, 2 * half + 1, mode="nearest")
+    is_ramp &= ~is_near_idle
+    if levels.vector_a is not None:
+        is_ramp |= _slow_ramps(levels, maximum_filter1d(is_near_idle, 2 * half + 1, mode="nearest"), half)
+    for k in np.flatnonzero(is_ramp).tolist():
+        names[k] = "ramp"
     # what lies between off and a ramp, shorter than a ramp is seen over, belongs to it
     ramps = [k for k, n in enumerate(names) if n == "ramp"]
     if ramps and (k := ramps[0]) <= 2 * half + int(np.argmin(idle)):
         for j in range(int(np.argmin(idle)), k):
             names[j] = "ramp"
+
+
+def _moved(hertz: Signal, before: np.ndarray, behind: np.ndarray, share: Signal | float) -> np.ndarray:
+    return np.asarray(np.abs(hertz[behind] - hertz[before]) > share * np.maximum(hertz[before], hertz[behind]))
+
+
+def _slow_ramps(levels: Levels, is_near_idle: np.ndarray, half: int) -> np.ndarray:
+    """Where the frequency of half a second before and of half a second behind both move, the same way."""
+    hertz, at = median_filter(levels.frequency_hz, half, mode="nearest"), np.arange(levels.frequency_hz.size)
+    before, behind = np.maximum(at - 2 * half, 0), np.minimum(at + 2 * half, at.size - 1)
+    is_one_way = (hertz[at] - hertz[before]) * (hertz[behind] - hertz[at]) >= 0.0
+    both = [
+        _moved(hertz, a, b, 0.5 * SLOW_CHANGE * (b - a) / (2 * half)) | (a == b)
+        for a, b in ((before, at), (at, behind))
+    ]
+    return np.asarray(both[0] & both[1] & is_one_way & ~is_near_idle)
 
 
 def _name_dips(levels: Levels, names: list[str]) -> None:
@@ -135,28 +162,49 @@ def _first_still(current: Signal, peak: int, below: float) -> int:
 
 def _name_steps(levels: Levels, begin: int, end: int, names: list[str]) -> None:
     """The clearest step of the level first, then those before and behind it."""
-    at = _clearest_step(
-        levels.current_a[begin:end], round(LEAST_STEADY_S / levels.hop_s), round(STEP_SIDE_S / levels.hop_s)
-    )
-    if at is None:
+    found = _clearest_step(levels.load_a[begin:end], levels.hop_s)
+    if found is None:
         return
-    edges = begin + at - HOPS // 2, begin + at + HOPS // 2
-    names[edges[0] : edges[1]] = ["load step"] * (edges[1] - edges[0])
+    at, gap = found
+    edges = begin + at - gap, begin + at + gap
+    volts = [float(np.median(levels.voltage_v[max(a, begin) : min(b, end)])) for a, b in _beside(edges, levels.hop_s)]
+    name = "voltage step" if abs(volts[1] - volts[0]) > DIP * max(volts) else "load step"
+    names[edges[0] : edges[1]] = [name] * (edges[1] - edges[0])
     _name_steps(levels, begin, edges[0], names)
     _name_steps(levels, edges[1], end, names)
 
 
-def _clearest_step(current: Signal, least: int, side: int) -> int | None:
-    """Where the level before and the level behind differ most, against how much each varies; None where nowhere enough. Windows that
-    reach over the step are left out of both."""
-    best, found = STEADIER, None
-    for k in range(least, current.size - least):
-        before, behind = (
-            current[max(k - HOPS // 2 - side, 0) : k - HOPS // 2],
-            current[k + HOPS // 2 : k + HOPS // 2 + side],
-        )
-        apart = abs(float(np.median(behind) - np.median(before)))
-        rest = float(np.std(before) + np.std(behind))
-        if apart > STEP * float(np.median(current)) and rest < best * apart:
-            best, found = rest / apart, k
+def _beside(edges: tuple[int, int], hop_s: float) -> tuple[tuple[int, int], tuple[int, int]]:
+    side = round(LEAST_STEADY_S / hop_s)
+    return (edges[0] - side, edges[0]), (edges[1], edges[1] + side)
+
+
+def _clearest_step(level: Signal | Vector, hop_s: float) -> tuple[int, int] | None:
+    """(where, half the change's length): where the level before and the level behind differ most, against how much each varies; None
+    where nowhere enough. What lies in the change is left out of both, and each is looked at for as long as the change takes, at least half
+    as long at the ends."""
+    best, found = 1.0, None
+    least, shortest = round(LEAST_STEADY_S / hop_s), HOPS // 2
+    sums, squares = (np.concatenate([[0.0], np.cumsum(x)]) for x in (level, np.abs(level) ** 2))
+    size = float(np.median(np.abs(level))) if level.size else 0.0
+
+    def mean_and_variance(a: np.ndarray, b: np.ndarray) -> tuple[Vector, Signal]:
+        mean = (sums[b] - sums[a]) / (b - a)
+        return mean, np.asarray(np.maximum((squares[b] - squares[a]) / (b - a) - np.abs(mean) ** 2, 0.0))
+
+    for gap_s in CHANGES_S:
+        gap = max(round(0.5 * gap_s / hop_s), shortest)
+        for side in {max(round(s / hop_s), 2 * gap) for s in STEP_SIDES_S}:
+            near = max(min(side, least - shortest), gap)
+            k = np.arange(gap + near, level.size - gap - near + 1)
+            if k.size == 0:
+                continue
+            before, varies = mean_and_variance(np.maximum(k - gap - side, 0), k - gap)
+            behind, varies_too = mean_and_variance(k + gap, np.minimum(k + gap + side, level.size))
+            apart, rest = np.abs(behind - before), np.sqrt(varies) + np.sqrt(varies_too)
+            allowed = STEADIER * (side / (side + 2 * gap)) ** 2 * apart
+            share = np.where(apart > STEP * size, np.maximum(rest, FLAT * apart) / np.maximum(allowed, 1e-12), np.inf)
+            j = int(np.argmin(share))
+            if share[j] < best:
+                best, found = float(share[j]), (int(k[j]), gap)
     return found

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.monitor.intake.columns import complete
-from commissioner.monitor.signals.supply import space_vector
+from commissioner.monitor.signals.supply import Vector, space_vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
 
@@ -23,6 +23,13 @@ class Levels:
     sense: Signal
     """1 or -1: which way the supply's vector turns."""
     hop_s: float
+    vector_a: Vector | None = None
+    """The current in the voltage's frame, peak: active and reactive; None where no voltages were recorded."""
+
+    @property
+    def load_a(self) -> Signal | Vector:
+        """What moves with the load: at light load the size of the current hardly does."""
+        return self.current_a if self.vector_a is None else self.vector_a
 
 
 def plate_like(recording: RunningRecording) -> Nameplate:
@@ -71,4 +78,17 @@ def levels_of(recording: RunningRecording, plate: Nameplate) -> Levels | None:
         np.abs(np.angle(turn)) / (2.0 * np.pi * period),
         np.sign(np.angle(turn)),
         hop * period,
+        _in_voltage_frame(i, v, starts, n) if has_volts else None,
     )
+
+
+def _in_voltage_frame(i: Vector, v: Vector, starts: np.ndarray, n: int) -> Vector:
+    """Mean of i v* over each window, by the voltage's rms: of channels that are crossed the current turns the other way."""
+
+    def means(x: np.ndarray) -> Vector:
+        total = np.concatenate([[0.0], np.cumsum(x)])
+        return np.asarray((total[starts + n] - total[starts]) / n)
+
+    straight, crossed = means(i * np.conj(v)), means(np.conj(i) * np.conj(v))
+    turned = straight if np.abs(straight).sum() >= np.abs(crossed).sum() else crossed
+    return np.asarray(turned / np.maximum(np.sqrt(means(np.abs(v) ** 2).real), 1e-9))

@@ -1,0 +1,144 @@
+"""Loads that step, build up, drift and swing, and supplies that ramp slowly or step; truth from phasors and closed forms."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from commissioner.monitor.chain import Refused, Wishes
+from commissioner.monitor.intake.states.naming import named
+from commissioner.monitor.intake.states.stretches import states
+from commissioner.monitor.intake.states.windows import Levels
+from commissioner.monitor.loads.mean_torque import whole_record_torque
+from commissioner.monitor.signals.supply import TurningFrame
+from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import from_nameplate, stator_impedance
+from commissioner.operations.recordings.stretches import in_its_states, said_by_terminals
+from commissioner.records import RunningRecording
+
+PLATE = Nameplate(4000.0, 400.0, 50.0, 8.3, 1440.0, 0.82, 2, "star")
+HOP_S = 0.02
+
+
+def runs_of(currents: np.ndarray) -> list[tuple[str, float, float]]:
+    count = currents.size
+    names = named(
+        Levels(np.arange(count) * HOP_S, currents, np.full(count, 230.0), np.full(count, 50.0), np.ones(count), HOP_S),
+        PLATE,
+    )
+    edges = [0, *(k for k in range(1, count) if names[k] != names[k - 1]), count]
+    return [(names[a], round(a * HOP_S, 2), round(b * HOP_S, 2)) for a, b in pairwise(edges)]
+
+
+def recorded(
+    slip=lambda t: 0.03 + 0 * t, volts=lambda t: 1.0 + 0 * t, hertz=lambda t: 50.0 + 0 * t, seconds=8.0, crossed=False
+):
+    """The plate's circuit, at each moment in its steady state at this slip, voltage and frequency; 0.3 % noise."""
+    t, noise = np.arange(round(seconds / 5e-4)) * 5e-4, np.random.default_rng(4)
+    circuit, turned = from_nameplate(PLATE), 2 * np.pi * np.cumsum(hertz(t)) * 5e-4
+    impedance = np.array([stator_impedance(circuit, 100 * np.pi, s) for s in np.linspace(0.0, 0.08, 801)])
+    grid = np.linspace(0.0, 0.08, 801)
+    z = np.interp(slip(t), grid, impedance.real) + 1j * np.interp(slip(t), grid, impedance.imag)
+    v = 326.6 * volts(t) * hertz(t) / 50.0 * np.exp(1j * turned)
+    phases = [
+        [(x * np.exp(-2j * np.pi * k / 3)).real + scale * noise.standard_normal(t.size) for k in range(3)]
+        for x, scale in ((v / z, 0.03), (v, 1.0))
+    ]
+    i = phases[0][::-1] if crossed else phases[0]
+    return RunningRecording(t, tuple(i), tuple(phases[1]), False, None, 5e-4)
+
+
+def names_of(recording) -> list[str]:
+    return [s.state for s in states(recording, PLATE)]
+
+
+def at(time_s, first, then):
+    return lambda t: np.where(t < time_s, first, then)
+
+
+def test_steps_less_than_a_second_apart_are_each_told():
+    """A hoist: its three loads had been one steady stretch, and its torque one number."""
+    t = np.arange(200) * HOP_S
+    found = runs_of(np.where(t < 1.4, 5.4, np.where(t < 2.2, 7.0, 9.8)))
+    assert [s[0] for s in found] == ["steady", "load step", "steady", "load step", "steady"]
+    assert found[1][1] <= 1.4 <= found[1][2] and found[3][1] <= 2.2 <= found[3][2]
+
+
+@pytest.mark.parametrize("takes_s", [0.5, 1.0, 2.0, 3.0])
+def test_a_load_that_builds_up_is_no_part_of_the_steady_stretches_beside_it(takes_s):
+    t = np.arange(500) * HOP_S
+    found = runs_of(np.interp(t, [3.5, 3.5 + takes_s], [5.4, 8.0]))
+    assert [s[0] for s in found] == ["steady", "load step", "steady"]
+    assert found[0][2] == pytest.approx(3.5, abs=0.2 + 0.1 * takes_s)
+    assert found[2][1] == pytest.approx(3.5 + takes_s, abs=0.2 + 0.1 * takes_s)
+
+
+@pytest.mark.parametrize("period_s", [0.3, 0.6, 1.1, 1.7, 2.5, 4.0, 5.0, 8.0, 13.0])
+def test_the_crests_of_a_swing_are_no_levels(period_s):
+    t = np.arange(1000) * HOP_S
+    assert {s[0] for s in runs_of(6.0 + 2.0 * np.sin(2 * np.pi * t / period_s + 0.4))} == {"steady"}
+
+
+@pytest.mark.parametrize("crossed", [False, True])
+def test_a_step_at_light_load_moves_the_power_not_the_current(crossed):
+    """From 0.2 to 0.8 % slip the current grows by a twelfth."""
+    light = recorded(slip=at(4.0, 0.002, 0.008), crossed=crossed)
+    assert names_of(light) == ["steady", "load step", "steady"]
+
+
+def test_a_voltage_that_steps_is_no_load_step():
+    """Star to delta."""
+    assert names_of(recorded(volts=at(4.0, 3**-0.5, 1.0), slip=at(4.0, 0.03, 0.01))) == [
+        "steady",
+        "voltage step",
+        "steady",
+    ]
+
+
+@pytest.mark.parametrize("takes_s", [1.0, 4.0])
+def test_a_slow_ramp_parts_the_steady_stretches_before_and_behind(takes_s):
+    """30 to 40 Hz: 2.5 Hz/s had been steady."""
+    seen = states(recorded(hertz=lambda t: np.interp(t, [3.0, 3.0 + takes_s], [30.0, 40.0]), seconds=10.0), PLATE)
+    assert [s.state for s in seen] == ["steady", "ramp", "steady"]
+    assert (seen[1].start_s, seen[1].end_s) == pytest.approx((3.0, 3.0 + takes_s), abs=0.25)
+
+
+@pytest.mark.parametrize(
+    "slip",
+    [
+        lambda t: 0.02 + 0.02 * t / 8.0,
+        lambda t: 0.025 + 0.015 * np.sin(2 * np.pi * t / 0.7),
+        lambda t: 0.025 + 0.015 * np.sin(2 * np.pi * t / 3.0),
+        at(7.7, 0.012, 0.04),
+    ],
+)
+def test_what_the_load_moves_by_is_in_the_deviation_of_its_mean(slip):
+    """Drifting, swinging, stepping at the very end: the air-gap power's rms movement by closed form."""
+    recording = recorded(slip)
+    seen, _, stretches = in_its_states(recording, PLATE, Wishes())
+    assert isinstance(seen, Refused)
+    part = said_by_terminals(seen, stretches, PLATE)
+    circuit, s = from_nameplate(PLATE), slip(recording.time_s)
+    impedance = np.array([stator_impedance(circuit, 100 * np.pi, x) for x in np.linspace(0.001, 0.05, 200)])
+    power = 1.5 * 326.6**2 * np.interp(s, np.linspace(0.001, 0.05, 200), (1.0 / impedance).real)
+    moves = float(np.std(power)) / (50 * np.pi)
+    assert part.torque_nm.std > 0.85 * moves
+    assert any(f.code == "load_moves" for f in part.findings)
+
+
+def test_the_mean_torque_is_of_everything_and_its_deviation_holds_the_drift():
+    """200 V, 10 A to 20 A in phase, R_s 1 ohm: the segment is the first quarter."""
+    count, current = 4000, np.repeat([10.0, 20.0], 2000)
+    t = np.arange(count) * 5e-3
+    frame = TurningFrame(
+        time_s=t, current_a=current + 0j, voltage_v=np.full(count, 200.0 + 0j), supply_angle_rad=100 * np.pi * t,
+        supply_rad_per_s=np.full(count, 100 * np.pi), sample_period_s=5e-3, band_hz=50.0, start_angle_rad=0.0,
+        slip_phase_rad=np.zeros(count),
+    )  # fmt: skip
+    found = SimpleNamespace(shaft=SimpleNamespace(frequency_hz=25.0), loads=())
+    fitted = SimpleNamespace(circuit=SimpleNamespace(stator_resistance_ohm=1.0))
+    mean, std = whole_record_torque(frame, slice(0, 1000), found, fitted, 2, (18.0, 0.1))
+    low, high = (1.5 * (200.0 * i - i**2) / (50 * np.pi) for i in (10.0, 20.0))
+    assert mean == pytest.approx(18.0 + 0.5 * (high - low))
+    assert std == pytest.approx(0.5 * (high - low), rel=0.02)
