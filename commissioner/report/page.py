@@ -189,12 +189,14 @@ def _shown(part: str | Table | Picture | Folded) -> Markup:
     match part:
         case Table():
             columns = [marks.Column(name) for name in part.header]
-            return marks.table(columns, part.rows, tones=part.tones, caption=part.caption)
+            return _WIDE.format(marks.table(columns, part.rows, tones=part.tones, caption=part.caption))
         case Picture():
-            return marks.figure(
-                "", Markup('<div class="plot" tabindex="0">{}</div>').format(Markup(part.markup)), part.caption
-            )
+            return marks.figure("", _WIDE.format(Markup(part.markup)), part.caption)
         case Folded():
             inside = Markup("").join(map(_shown, part.parts))
             return Markup('<details class="part"><summary>{}</summary>{}</details>').format(part.summary, inside)
     return marks.paragraph(part)
+
+
+_WIDE = Markup('<div class="wide" tabindex="0">{}</div>')
+"""A frame that scrolls sideways where what it holds is wider than the sheet."""

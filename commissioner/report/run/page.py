@@ -32,12 +32,12 @@ def run_page(
     first = tuned_sheet(subject) if result.get("tune") else certificate(subject)
     pages = [
         Page("result", "Result", first),
-        Page("evidence", "Evidence", evidence(subject)),
+        Page("evidence", "Evidence", evidence(subject), flows=not subject.tests),
         Page("simulation", "Plain simulation", plain_simulation(subject)),
-        Page("a", "A Checks", checks_and_course(subject), is_appendix=True),
-        Page("b", "B Procedure", registers_and_record(subject), is_appendix=True),
-        Page("c", "C Uncertainty", uncertainty(subject), is_appendix=True),
-        Page("d", "D The motor over the years", years_sheet(years), is_appendix=True),
+        Page("a", "A Checks", checks_and_course(subject), flows=True),
+        Page("b", "B Procedure", registers_and_record(subject), flows=True),
+        Page("c", "C Uncertainty", uncertainty(subject), flows=True),
+        Page("d", "D The motor over the years", years_sheet(years), flows=True),
     ]
     return document(f"Report {subject.run}", _margins(subject, digest), [page for page in pages if page.body])
 

@@ -18,12 +18,12 @@ _RANGES = {"latin": _LATIN, "greek": "U+0370-03FF"}
 
 @dataclass(frozen=True)
 class Page:
-    """A sheet that begins on a page of its own. `anchor` names it for links, `title` in the line of links."""
+    """A sheet that begins on a page of its own; below the one before where both flow. `anchor` names it for links, `title` in their line."""
 
     anchor: str
     title: str
     body: Markup
-    is_appendix: bool = False
+    flows: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def document(title: str, margins: Margins, pages: Sequence[Page]) -> str:
     )
     sheets = Markup("").join(
         Markup('<section class="pg{}" id="{}">{}{}</section>').format(
-            " app" if page.is_appendix else "", page.anchor, kick, page.body
+            " flows" if page.flows else "", page.anchor, kick, page.body
         )
         for page in pages
     )

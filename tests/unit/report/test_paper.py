@@ -52,13 +52,14 @@ def test_a_recordings_page_is_a_sheet_whose_tables_fold_and_whose_figures_keep_t
     table = Table(("what repeats", "frequency / Hz", ""), [("shaft", "24.36", "1<2")], ["warn"], "a caption")
     text = render(Page("t", "h", "warn", [("slip", "2 %")], [Section("s", table, Picture("<svg></svg>", "seen"))]))
     body = text.partition("<main>")[2]
-    assert '<table class="cards"><caption>a caption</caption>' in body
+    assert '<div class="wide" tabindex="0"><table class="cards"><caption>a caption</caption>' in body
     assert (
         '<tr class="warn"><th scope="row">shaft</th><td data-l="frequency / Hz">24.36</td><td>1&lt;2</td></tr>' in body
     )
-    assert '<figure><div class="plot" tabindex="0"><svg></svg></div><figcaption>seen</figcaption></figure>' in body
+    assert '<figure><div class="wide" tabindex="0"><svg></svg></div><figcaption>seen</figcaption></figure>' in body
     assert "<dt>slip</dt><dd><b>2 %</b></dd>" in body
     on_a_phone = text.partition("@media screen and (max-width: 760px)")[2].partition("</style>")[0]
-    assert ".plot { overflow-x: auto; } .plot > :is(svg, img) { min-width: 48rem; }" in on_a_phone
+    assert ".wide > :is(svg, img) { min-width: 48rem; }" in on_a_phone
+    assert "@media screen { .wide { overflow-x: auto; } }" in text
     assert 'content: "page " counter(page)' in text
     assert '<nav class="bar" aria-label="Parts of the report"><b>t</b></nav>' in text

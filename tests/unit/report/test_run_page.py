@@ -280,7 +280,9 @@ def test_a_run_that_broke_off_draws_current_and_flux_up_to_its_end():
     subject = Subject(stopped, [*JOURNAL, *judged], Findings(blocks=blocks), {})
     assert subject.guarded[0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     assert subject.applied_a[0][-1] == pytest.approx(0.4) and subject.applied_a[1] == pytest.approx(3.0)
-    said = words(run_page(stopped, [*JOURNAL, *judged], Findings(blocks=blocks)))
+    page = run_page(stopped, [*JOURNAL, *judged], Findings(blocks=blocks))
+    assert 'class="pg flows" id="evidence"' in page and 'class="pg flows" id="a"' in page  # one figure fills no sheet
+    said = words(page)
     assert "Up to the end of the run" in said and "limit 9.90 A" in said and "limit 0.877 Wb" in said
     assert "Stator flux by the guard" not in words(run_page(stopped, JOURNAL, Findings(blocks=blocks)))
     assert "The evidence" not in words(run_page(stopped, JOURNAL, Findings()))

@@ -158,3 +158,11 @@ def test_a_cards_label_wraps_where_its_value_must_not():
     sheet = files("commissioner.report.sheet").joinpath("sheet.css").read_text("utf-8")
     rule = next(line for line in sheet.splitlines() if "table.cards td[data-l]::before, table.cards .col" in line)
     assert "white-space: normal" in rule
+
+
+def test_two_sheets_that_flow_share_a_printed_page_and_any_other_begins_its_own():
+    pages = [Page(n, n, Markup("<p>x</p>"), flows=n != "a") for n in "abc"]
+    text = document("t", Margins("s", "m", "r", "", ""), pages)
+    assert re.findall(r'<section class="([^"]*)" id', text) == ["pg", "pg flows", "pg flows"]
+    printed = text.partition("@media print")[2]
+    assert ".pg.flows + .pg.flows { break-before: auto;" in printed and "break-before: page; }" in printed
