@@ -19,6 +19,10 @@ from tests.replay.golden import SEED, short_run
 from tests.support.command_line import call
 from tests.support.sim_process import SimProcess
 
+LONGEST_S = 600.0
+"""A whole diagnosis along one axis: 60 CPU-seconds, on a host that does three things at once much longer."""
+pytestmark = pytest.mark.timeout(LONGEST_S)
+
 
 @pytest.fixture(scope="module")
 def undiagnosed(tmp_path_factory):
@@ -29,7 +33,7 @@ def undiagnosed(tmp_path_factory):
 @pytest.fixture(scope="module")
 def ended(undiagnosed, tmp_path_factory):
     folder = copy_of(undiagnosed, tmp_path_factory.mktemp("archive"))
-    return call("runs", "diagnose", "last", "--runs", str(folder.parent), "--json", timeout_s=300.0), folder
+    return call("runs", "diagnose", "last", "--runs", str(folder.parent), "--json", timeout_s=LONGEST_S), folder
 
 
 @pytest.fixture
