@@ -112,8 +112,9 @@ def _add_own(state: State, seen: Observation | Refused, plate: Nameplate) -> Non
         return
     of_terminals_alone = seen.reason.code in SHORT | SILENT
     state["withheld"] = ("from current, voltage and plate only: " if of_terminals_alone else "") + seen.reason.what
-    wander = power_wander_w(seen.audited)
-    terminal = from_terminals(seen.audited.fundamental, plate, wander) if of_terminals_alone else None
+    if not of_terminals_alone:
+        return
+    terminal = from_terminals(seen.audited.fundamental, plate, power_wander_w(seen.audited))
     if terminal is not None:
         state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
