@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable
 
 TRANSLATED = {
     "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
@@ -61,14 +62,14 @@ TRANSLATED = {
 
 
 def folded(text: str) -> str:
-    """The text without marks above and below its letters: `Fréquence` as `Frequence`."""
-    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+    """The text without marks above and below its letters: `Fréquence` as `Frequence`, `akım` as `akim`."""
+    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c)).replace("ı", "i")
 
 
 def translated(name: str) -> str:
     """The name with words of other languages replaced by those that are looked for; any other name as it is."""
     plain = folded(name).replace("\u2019", "'")
-    out = _ANY.sub(lambda found: f" {_BY_PLAIN[found[0].lower()]} ", plain)
+    out = _ANY.sub(lambda found: f" {_BY_PLAIN.get(found[0].lower(), found[0])} ", plain)
     return name if out == plain else " ".join(out.split())
 
 
@@ -79,13 +80,12 @@ def readings(name: str) -> tuple[str, ...]:
     return (said, f"{rest} {first}") if rest and said != name else (said,)
 
 
-def _pattern(word: str) -> str:
-    return (
-        rf"(?<![a-z]){re.escape(word)}" + ("" if word.endswith("'") else "(?![a-z])")
-        if word.isascii()
-        else re.escape(word)
-    )
+def _any_of(words: Iterable[str]) -> str:
+    return "|".join(map(re.escape, sorted(words, key=len, reverse=True)))
 
 
 _BY_PLAIN = {folded(word): ours for word, ours in TRANSLATED.items()}
-_ANY = re.compile("|".join(_pattern(word) for word in sorted(_BY_PLAIN, key=len, reverse=True)), re.IGNORECASE)
+_ELIDED = [word for word in _BY_PLAIN if word.endswith("'")]
+_LATIN = [word for word in _BY_PLAIN if word.isascii() and word not in _ELIDED]
+_OTHERS = [word for word in _BY_PLAIN if not word.isascii()]
+_ANY = re.compile(rf"(?<![a-z])(?:(?:{_any_of(_LATIN)})(?![a-z])|{_any_of(_ELIDED)})|{_any_of(_OTHERS)}", re.IGNORECASE)

@@ -64,10 +64,18 @@ def test_what_only_reads_a_drive_or_an_archive_imports_no_estimator(call, tmp_pa
     assert imported(call, tmp_path, ("scipy.optimize", "numba", "matplotlib", "pyarrow"))[1:] == []
 
 
+def test_identifying_a_recording_imports_nothing_of_a_diagnosis(tmp_path):
+    """A third of such a call's time were a diagnosis's imports: it learnt from them whether the file is a test sheet."""
+    table = tmp_path / "recording.csv"
+    table.write_text("time_s,voltage_axis_v,current_u_a,current_v_a\n0,1,0,0\n0.001,1,0,0\n", encoding="utf-8")
+    heavy = ("scipy.signal", "scipy.stats", "matplotlib", "commissioner.diagnose.causes", "commissioner.running")
+    assert imported(("identify", str(table)), tmp_path, heavy) == ["3"]
+
+
 def imported(call, tmp_path, heavy):
     """The verb's exit code, and which of `heavy` it imported."""
     make_run(tmp_path / "runs", "20260101-000000-simulated-abcdef")
-    where = ("--runs", str(tmp_path / "runs")) if call[0] != "check" and "--help" not in call else ()
+    where = ("--runs", str(tmp_path / "runs")) if call[0] not in {"check", "identify"} and "--help" not in call else ()
     environment = {name: value for name, value in os.environ.items() if name != "COMMISSIONER_ARCHIVE"}
     command = [sys.executable, "-c", AUDIT, ",".join(heavy), *call, *where]
     done = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment, check=False)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from commissioner.diagnose.contract import CONVENTION, DiagnosisDocument
 from commissioner.diagnose.points.meters import line_values
 from commissioner.diagnose.points.table import is_points_table
-from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
 from commissioner.errors import DataRefused
 from commissioner.identify.contract import Measured, ThreeTestsDocument
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
@@ -20,6 +19,9 @@ from commissioner.operations.recordings.trust import Trust, judged
 from commissioner.recordings.sheet_names import missing_of_sheet
 from commissioner.recordings.table import Table
 from commissioner.records import ReadingNote
+
+if TYPE_CHECKING:
+    from commissioner.diagnose.points.three_tests import ThreeTests
 
 NOTHING_LEFT = (
     "Three tests fix the circuit and leave nothing over: no cause can be seen or ruled out. The circuit is below; `identify` "
@@ -62,11 +64,15 @@ def require_whole_sheets(tables: Sequence[Table]) -> None:
 
 def are_three(tables: Sequence[Table]) -> bool:
     """Whether they are the few rows of different tests that make a circuit together."""
+    from commissioner.diagnose.points.three_tests import are_three_tests
+
     return are_three_tests([t.columns for t in tables])
 
 
 def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) -> ThreeTestsDocument:
     """The circuit's document. DataRefused: a test is missing or impossible, or contradicts the plate and nobody decided."""
+    from commissioner.diagnose.points.three_tests import solve
+
     plate = plate_metadata(motor)
     found = solve([t.columns for t in tables], [{**t.metadata, **plate} for t in tables])
     if isinstance(found, DataRefused):
