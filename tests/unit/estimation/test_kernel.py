@@ -64,7 +64,7 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
         assert np.abs(differences - exact[k]).max() <= 2e-5 * max(np.abs(exact[k]).max(), 1.0), name
 
 
-COUNT_LOADED = 100
+COUNT_LOADED = 40
 LOAD = (np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 2 * COUNT_LOADED - 1))
 """Four knots over as many samples."""
 

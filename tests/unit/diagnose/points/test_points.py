@@ -79,10 +79,10 @@ def test_skin_effect_and_leakage_saturation_are_named_together_with_their_sizes(
     assert seen.relative_after < 0.4 * seen.relative_before
 
 
-def test_one_cause_does_not_bring_the_other():
-    for motor in MOTORS:
-        assert set(named(locked(motor, np.random.default_rng(5), 0.003, saturation=0.1))[0]) == {"leakage_saturation"}
-        assert set(named(locked(motor, np.random.default_rng(6), 0.003, skin=0.2))[0]) == {"rotor_skin_effect"}
+@pytest.mark.parametrize("motor", MOTORS, ids=lambda m: m.name)
+def test_one_cause_does_not_bring_the_other(motor):
+    assert set(named(locked(motor, np.random.default_rng(5), 0.003, saturation=0.1))[0]) == {"leakage_saturation"}
+    assert set(named(locked(motor, np.random.default_rng(6), 0.003, skin=0.2))[0]) == {"rotor_skin_effect"}
 
 
 @pytest.mark.parametrize("motor", MOTORS, ids=lambda m: m.name)
