@@ -82,6 +82,10 @@ class Texts:
         """Whether `tell` has it in this language."""
         return self.language == "en" or self.tell(text) != str(text)
 
+    @property
+    def _mark(self) -> str:
+        return "," if self.language == "de" else "."
+
     def _value(self, text: str) -> str:
         """What stood in a sentence's gap: a word that is known, or as it was, its numbers with this language's mark. An address, a
         version of three parts and a file's name are no number."""
@@ -97,10 +101,12 @@ class Texts:
         if value is None or not math.isfinite(value):
             return self.gettext("no value")
         shown = 0.0 if round(value, digits) == 0 else value
-        text = f"{round(shown, digits):.{max(0, digits)}f}".replace("-", "\u2212")
-        if self.language == "de":
-            text = text.replace(".", ",")
+        text = f"{round(shown, digits):.{max(0, digits)}f}".replace("-", "\u2212").replace(".", self._mark)
         return text + (NBSP + unit if unit else "")
+
+    def typed(self, value: float) -> str:
+        """A number as it stands in a form's field."""
+        return f"{value:.10g}".replace(".", self._mark)
 
     def with_error(self, value: float, std: float | None, unit: str) -> str:
         """`0.025640 ± 0.000097 A`: the 95 % interval to two digits, the value as far as these."""
@@ -124,10 +130,9 @@ class Texts:
                 return self.gettext("no value")
             digits = 0 if value == 0 or isinstance(value, int) else max(0, 3 - math.floor(math.log10(abs(value))))
             text = self.number(float(value), min(digits, 6), unit)
-            mark = "," if self.language == "de" else "."
-            if mark in text.split(NBSP)[0] and not isinstance(value, int):
+            if self._mark in text.split(NBSP)[0] and not isinstance(value, int):
                 head, *rest = text.split(NBSP)
-                text = NBSP.join([head.rstrip("0").rstrip(mark), *rest])
+                text = NBSP.join([head.rstrip("0").rstrip(self._mark), *rest])
             return text
         return self.gettext("no value") if value is None else self._value(self.tell(value))
 

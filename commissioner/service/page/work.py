@@ -119,8 +119,9 @@ async def motor(request: Request, drive: str, motor: str = "") -> Response:
     parts = parts_of(request)
     known = parts.library.drive(drive)
     chosen = next((m for m in parts.library.motors() if m.id == motor), None) or parts.library.motors()[0]
-    values = {key: _plain(value) for key, value in asdict(chosen.plate).items()}
-    values["rated_power_kw"] = _plain(chosen.plate.rated_power_w / 1000)
+    texts = texts_of(request)
+    values = {key: _typed(value, texts) for key, value in asdict(chosen.plate).items()}
+    values["rated_power_kw"] = texts.typed(chosen.plate.rated_power_w / 1000)
     return _motor_page(request, known, chosen, values, judge_plate(asdict(chosen.plate)), chosen.name)
 
 
@@ -416,6 +417,6 @@ def _slug(name: str, taken: set[str]) -> str:
     return next(one for one in (plain, *(f"{plain}_{k}" for k in range(2, 1000))) if one not in taken)
 
 
-def _plain(value: Any) -> str:
-    """A number as it stands in a form's field."""
-    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+def _typed(value: float | str | None, texts: Texts) -> str:
+    """A value of the plate as it stands in its field."""
+    return texts.typed(value) if isinstance(value, int | float) else value or ""
