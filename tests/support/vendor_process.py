@@ -13,6 +13,19 @@ from typing import Any
 FOLDER = Path(__file__).parents[1] / "data" / "vendors"
 MADE_UP = tuple(str(FOLDER / f"{name}.toml") for name in ("behind_a_mailbox", "needs_an_unlock"))
 """Drives that nobody sells, which wear what no file of config/drives has a source for."""
+DRIVES = """
+[[drives]]
+id = "remote"
+name = "Pump 7"
+url = "{remote}"
+profile = "schneider_atv340"
+[[drives]]
+id = "assisted"
+name = "Fan 2"
+url = "{assisted}"
+profile = "danfoss_fc302"
+"""
+"""One that begins its tuning when it is told to, one that a person begins at its keypad: a service's `more`."""
 
 
 class Vendor:

@@ -6,12 +6,14 @@ python -m tests.campaigns.page.pictures OUT [--language de] [--only live,result]
 from __future__ import annotations
 
 import argparse
+import re
 import tempfile
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from tests.support.service.browser import SIZES, SLOW_MS, Technician, chromium, technician
 from tests.support.service.service_process import ServiceProcess
+from tests.support.vendor_process import DRIVES, Vendor
 
 
 class Album:
@@ -149,6 +151,35 @@ def ends(album: Album) -> None:
     album.take("offline")
 
 
+def tunings(album: Album, assisted: Vendor) -> None:
+    """A drive that tunes itself when it is told to, and one that a person must start."""
+    hand, page = album.hand, album.hand.page
+    for drive in ("remote", "assisted"):
+        hand.go(f"/drives/{drive}")
+        hand.check()
+        album.take(f"{drive}-checks")
+        hand.button("what")
+        page.locator("#hold:enabled").wait_for(timeout=SLOW_MS)
+        page.locator("#repeat").select_option("1")
+        album.take(f"{drive}-tune")
+        hand.confirm()
+        hand.hold()
+        page.wait_for_url("**/runs/*")
+        if drive == "remote":
+            hand.wait_energised()
+            album.take("remote-tuning", whole=False)
+        for number, key in enumerate(("tune", "", "remote") if drive == "assisted" else (), 1):
+            question = page.locator(f"form[action$=answer]:has([name=number][value='{number}'])")
+            question.wait_for(timeout=SLOW_MS)
+            album.take(f"assisted-asked-{number}")
+            if key:
+                assisted.press(key)
+                page.wait_for_timeout(600)
+            question.get_by_role("button", name=re.compile("Done|Fertig")).click()
+        page.locator(".verdict").wait_for(timeout=SLOW_MS)
+        album.take(f"{drive}-tuned")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
@@ -158,17 +189,22 @@ def main() -> None:
     parser.add_argument("--axes", default="0, 60, 120")
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
-    parts: list[Callable[[Album], None]] = [work, ends]
     with (
         tempfile.TemporaryDirectory() as folder,
         chromium() as browser,
+        Vendor("schneider_atv340", "--tuning-s", "3") as remote,
+        Vendor("danfoss_fc302", "--tuning-s", "0.2") as assisted,
         ServiceProcess(
-            Path(folder) / "s", speed=asked.speed, diagnosis=True, settings=f"axes_deg = [{asked.axes}]"
+            Path(folder) / "s",
+            speed=asked.speed,
+            diagnosis=True,
+            settings=f"axes_deg = [{asked.axes}]",
+            more=DRIVES.format(remote=remote.url, assisted=assisted.url),
         ) as service,
         technician(browser, service, asked.language) as hand,
     ):
         album = Album(hand, asked.out, set(filter(None, asked.only.split(","))))
-        for part in parts:
+        for part in (partial(tunings, assisted=assisted), work, ends):
             part(album)
         for fault in (*album.faults, *hand.complaints):
             print(fault)

@@ -7,21 +7,9 @@ from playwright.sync_api import expect
 
 from tests.support.service.browser import SLOW_MS, technician
 from tests.support.service.service_process import ServiceProcess
-from tests.support.vendor_process import Vendor
+from tests.support.vendor_process import DRIVES, Vendor
 
 pytestmark = pytest.mark.timeout(600)
-DRIVES = """
-[[drives]]
-id = "remote"
-name = "Pump 7"
-url = "{remote}"
-profile = "schneider_atv340"
-[[drives]]
-id = "assisted"
-name = "Fan 2"
-url = "{assisted}"
-profile = "danfoss_fc302"
-"""
 
 
 @pytest.fixture(scope="module")
