@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from commissioner.monitor.intake.findings import Finding, Findings, Generator
+from commissioner.monitor.intake.findings import Audited, Finding, Findings, Generator, miswired
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit, slip_at_current, slip_at_power, stator_impedance
@@ -151,6 +151,12 @@ def pair(
         tuple(o[2] for o in options if max(least, 0.0) < o[2] < 90.0 and o[2] != lag), generator,
         wiring_of(chosen, named),
     )  # fmt: skip
+
+
+def is_straight_motor(seen: Pairing | Audited) -> bool:
+    """Whether the channels, as they are named, make a motor, and nothing else does."""
+    is_alone = seen.generator is None and not seen.rivals_deg and not miswired(seen.findings)
+    return is_alone and bool(seen.wired) and 0.0 < seen.lag_deg < 90.0
 
 
 def _voltage_order(sequence: int, line_to_line: bool) -> tuple[Order, int]:

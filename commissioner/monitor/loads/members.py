@@ -11,12 +11,10 @@ from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.machine.estimate import Kept, band_weights, speed_lines
 from commissioner.monitor.machine.fit import Fitted, Problem
 from commissioner.monitor.periods.combs import Found
-from commissioner.monitor.periods.periods import VISIBLE, PairSpectrum, Periodicity
+from commissioner.monitor.periods.periods import MOST_TURNS, VISIBLE, PairSpectrum, Periodicity
 from commissioner.monitor.signals.averaging import Comb
 from commissioner.monitor.signals.tracking import PhaseDrift
 
-MOST_TURNS = 6
-"""A load that repeats after at most so many shaft turns is one comb with the shaft."""
 FM_MATTERS_RAD = 0.02
 MOST_PAIRS = 6
 SAME_LINE = 3e-4

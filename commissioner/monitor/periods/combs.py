@@ -80,7 +80,8 @@ def _again(frame: TurningFrame, part: slice, alone: Vector, spectrum: PairSpectr
 def _find_shaft(
     frame: TurningFrame, part: slice, residual: Vector, spectrum: PairSpectrum, search: ShaftSearch
 ) -> tuple[Periodicity | None, tuple[tuple[float, float], ...]]:
-    """The best comb of the slip range whose lines do not lead out of it: half a supply period is a pulse pattern's own, too."""
+    """The best comb of the slip range whose lines do not lead out of it (half a supply period is a pulse pattern's own, too) and are
+    not a slower load's."""
     candidates = periods.shaft_candidates(spectrum, search, periods.search_harmonics(frame.band_hz, search))
     table = tuple((f, score) for f, score, _ in candidates)
     low, high = periods.range_hz(search)
@@ -96,7 +97,8 @@ def _find_shaft(
         top = periods.top_of_line(spectrum, frequency, seen)
         shaft = _refined(frame, part, residual, spectrum, "shaft", top, seen)
         beside = OUTSIDE_SIGMA * shaft.frequency_std_hz
-        if low - beside <= shaft.frequency_hz <= high + beside:
+        is_inside = low - beside <= shaft.frequency_hz <= high + beside
+        if is_inside and any(periods.stands_out(spectrum, h * shaft.frequency_hz) for h in seen):
             return shaft, table
     return None, table
 

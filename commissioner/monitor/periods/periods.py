@@ -30,6 +30,11 @@ LOBE_CELLS = 4 / 3
 """From a line's top to the foot of its main lobe, in cells of 1.5 over the length (Hann's window: two over the length)."""
 DYNAMIC_RANGE = 1e-5
 """Below 100 dB no sensor is linear, so without noise the floor is not zero."""
+MOST_TURNS = 6
+"""A load that repeats after at most so many shaft turns is one comb with the shaft."""
+OUT_OF_COMB, NEIGHBOURS = 4.0, np.array([-3, -2, -1, 1, 2, 3])
+"""Power of the shaft's line against those of a slower load's comb beside it, if it is no line of that comb: one of rectangular pulses is
+at most twice the strongest of three on either side, since max |cos(m pi duty)| >= 1 / sqrt 2 over m = 1, 2, 3 for every duty."""
 LOWEST_LOAD_HZ = 0.8
 HIGHEST_LOAD_HZ = 220.0
 MOST_LOADS = 3
@@ -184,6 +189,20 @@ def shaft_candidates(
         if len(best) >= 5:
             break
     return best
+
+
+def stands_out(spectrum: PairSpectrum, frequency_hz: float) -> bool:
+    """False where a slower load's comb has lines of like size beside this one: its harmonics fall into every slip range."""
+    slower = find_peaks_above(
+        spectrum, SIGNIFICANT, 2.0 * spectrum.cell_hz, frequency_hz / MOST_TURNS - spectrum.cell_hz
+    )
+    if not slower:
+        return True
+    own, beside = (
+        float(spectrum.at(frequency_hz, 0.3)[0]),
+        float(spectrum.at(frequency_hz + slower[0][0] * NEIGHBOURS).max()),
+    )
+    return own > VISIBLE and (beside < VISIBLE or own > OUT_OF_COMB * beside)
 
 
 def top_of_line(spectrum: PairSpectrum, frequency_hz: float, orders: tuple[int, ...]) -> float:

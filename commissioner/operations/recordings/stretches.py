@@ -11,7 +11,7 @@ from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.against_plate import against_plate, doubt_of, of_contradiction, over_currents
 from commissioner.monitor.intake.carrier import means_over_carrier
-from commissioner.monitor.intake.channels import Wiring
+from commissioner.monitor.intake.channels import Wiring, is_straight_motor
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
@@ -60,13 +60,29 @@ def in_its_states(
     note = ReadingNote(
         "states", f"{_listed(stretches)}: the answer is of the steady {_span(longest)}, what is beside it was not used"
     )
-    seen = _watched(replace(part, notes=(*part.notes, note)), plate, wishes)
+    noted = replace(part, notes=(*part.notes, note))
+    parts = {s: noted if s is longest else cut_out(recording, s, MARGIN_S) for s in steady}
+    watched = _wired_alike(parts, plate, wishes)
     out = [as_state(s, used=s is longest) for s in stretches]
     for stretch, state in zip(stretches, out, strict=True):
-        if stretch in steady:
-            own = seen if stretch is longest else _watched(cut_out(recording, stretch, MARGIN_S), plate, wishes)
-            _add_own(state, own, plate)
-    return seen, part, out
+        if stretch in watched:
+            _add_own(state, watched[stretch], plate)
+    return watched[longest], part, out
+
+
+def _wired_alike(
+    parts: dict[Stretch, RunningRecording], plate: Nameplate, wishes: Wishes
+) -> dict[Stretch, Observation | Refused]:
+    """What each stretch says. Where one alone leaves open whether it generates or is crossed, the wiring is that of the others: of those
+    that read, as they are named, as a motor in no second way."""
+    watched = {stretch: _watched(part, plate, wishes) for stretch, part in parts.items()}
+    told = {seen.audited.wired for seen in watched.values() if is_straight_motor(seen.audited)}
+    if len(told) == 1:
+        known = replace(wishes, wired=told.pop())
+        for stretch, seen in watched.items():
+            if isinstance(seen, Refused) and seen.reason.code == "generating_or_crossed":
+                watched[stretch] = _watched(parts[stretch], plate, known)
+    return watched
 
 
 def _wired(recording: RunningRecording, stretches: tuple[Stretch, ...], plate: Nameplate) -> Wiring | None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.chain import Observation, Refused, Wishes
-from commissioner.monitor.intake.channels import THIRD, Pairing, pair
+from commissioner.monitor.intake.channels import THIRD, Pairing, is_straight_motor, pair
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.circuit import InverseGamma
@@ -140,6 +140,43 @@ def test_without_a_start_the_two_are_not_distinguishable_until_one_is_trusted(
     torques = [torque_of(in_its_states(recording, PLATE, Wishes(trust=trust))[0]) for trust in ("data", "plate")]
     assert torques[0] < 0.0 < torques[1]
     assert torques[0 if load < 0.0 else 1] == pytest.approx(true_torque(load), rel=0.05)
+
+
+def hoist(loads: tuple[float, float], order: tuple[int, ...] = STRAIGHT, sign: int = 1) -> RunningRecording:
+    """Lifting, then lowering: 2 s at one load, 3 s at the other."""
+    first, second = (recorded(load, order, sign, seconds=s) for load, s in zip(loads, (2.0, 3.0), strict=True))
+
+    def joined(a: tuple[np.ndarray, ...], b: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        u, v, w = (np.concatenate(pair_) for pair_ in zip(a, b, strict=True))
+        return u, v, w
+
+    time = np.arange(first.time_s.size + second.time_s.size) * first.sample_period_s
+    currents, volts = joined(first.currents_a, second.currents_a), joined(first.voltages_v, second.voltages_v)
+    return RunningRecording(time, currents, volts, False, None, first.sample_period_s, {}, "circuit")
+
+
+@pytest.mark.parametrize("lowering", [-0.35, -0.5])
+def test_a_hoist_that_lowers_is_wired_as_it_is_when_it_lifts(lowering: float) -> None:
+    """The lowering, being longest, had been refused, and the whole recording with it."""
+    seen, _, told = in_its_states(hoist((0.8, lowering)), PLATE, Wishes())
+    assert torque_of(seen) == pytest.approx(true_torque(lowering), rel=0.05)
+    torques = [s["mean_torque_nm"]["value"] for s in told if "mean_torque_nm" in s]
+    assert torques == pytest.approx([true_torque(0.8), true_torque(lowering)], rel=0.05)
+
+
+def test_a_hoist_with_crossed_channels_is_not_told_otherwise() -> None:
+    seen, _, _ = in_its_states(hoist((0.5, 0.4), (2, 0, 1), -1), PLATE, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == "generating_or_crossed"
+
+
+@pytest.mark.parametrize(("order", "sign"), [(o, s) for o in ORDERS for s in (1, -1) if (o, s) != (STRAIGHT, 1)])
+def test_no_crossed_channels_look_straight_at_one_load_and_generating_at_another(
+    order: tuple[int, ...], sign: int
+) -> None:
+    for machine in range(0, len(MACHINES), 2):
+        found = [paired(machine, load, order, sign) for load in (0.02, 0.3, 0.8, 1.2, -0.1, -0.5, -1.2)]
+        is_open = any(f.generator is not None and f.generator.is_named for f in found)
+        assert not (is_open and any(is_straight_motor(f) for f in found)), MACHINES[machine][0]
 
 
 def test_the_slip_tells_a_generator_that_shakes() -> None:

@@ -11,6 +11,7 @@ from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.loads.mean_torque import whole_record_torque
+from commissioner.monitor.periods.periods import SHAFT_SIGNIFICANT, find_peaks_above, pair_spectrum, stands_out
 from commissioner.monitor.signals.supply import TurningFrame
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
@@ -142,3 +143,33 @@ def test_the_mean_torque_is_of_everything_and_its_deviation_holds_the_drift():
     low, high = (1.5 * (200.0 * i - i**2) / (50 * np.pi) for i in (10.0, 20.0))
     assert mean == pytest.approx(18.0 + 0.5 * (high - low))
     assert std == pytest.approx(0.5 * (high - low), rel=0.02)
+
+
+def pulses(period_s, duty, low=0.01, high=0.04):
+    return lambda t: np.where((t + 0.1) % period_s < duty * period_s, high, low)
+
+
+@pytest.mark.parametrize(("period_s", "duty"), [(0.29, 0.31), (0.41, 0.5), (0.66, 0.25), (0.83, 0.4), (1.2, 0.25)])
+def test_harmonics_of_a_press_are_no_shaft(period_s, duty):
+    """They fall into the slip's range: speeds up to a hundred standard deviations off had been told, or the plate contradicted."""
+    seen, _, stretches = in_its_states(recorded(pulses(period_s, duty), seconds=12.0), PLATE, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == "no_shaft_line"
+    speed = said_by_terminals(seen, stretches, PLATE).speed_rad_per_s
+    slip = 0.01 + 0.03 * duty
+    assert abs(speed.value - 50 * np.pi * (1.0 - slip)) < 1.96 * speed.std
+
+
+@pytest.mark.parametrize("duty", np.linspace(0.04, 0.5, 24))
+def test_no_line_of_rectangular_pulses_stands_out_of_its_comb(duty):
+    t = np.arange(12000) * 1e-3
+    noise = np.array([1.0, 1j]) @ np.random.default_rng(6).standard_normal((2, t.size))
+    train = pulses(0.37, duty, 0.0, 1.0)(t) + 1e-3 * noise
+
+    def spectrum_of(signal):
+        return pair_spectrum(signal, 1e-3, 100.0)
+
+    spectrum = spectrum_of(train)
+    lines = [f for f, _ in find_peaks_above(spectrum, SHAFT_SIGNIFICANT, 18.0, 50.0)]
+    assert len(lines) >= 5 and not any(stands_out(spectrum, f) for f in lines)
+    turning = spectrum_of(train + 0.1 * np.exp(2j * np.pi * 22.97 * t))
+    assert stands_out(turning, 22.97)
