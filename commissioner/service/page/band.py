@@ -281,13 +281,14 @@ def _ended(run: LiveRun, standing: str, word: str, t: Texts) -> tuple[str, str, 
 def _drive_facts(live: LiveRun | None, drive: Drive | None, seen: Seen, t: Texts) -> tuple[str, str]:
     if live is not None:
         found = live.feed.state.drive
-        name = drive_words(found["drive_type"], found["serial_number"]) if found else (drive.name if drive else live.id)
+        said = t.tell(drive_words(found["drive_type"], found["serial_number"])) if found else ""
+        name = said or (drive.name if drive else live.id)
         return name, t.say("data %(age)s old", age=t.number(live.feed.age_s, 1, "s"))
     if drive is None:
         return t.gettext("none"), ""
     if not drive.url:
         return drive.name, t.gettext("not started")
-    name = seen.identity.words if seen.identity else drive.name
+    name = t.tell(seen.identity.words) if seen.identity else drive.name
     if seen.at_s < 0:
         return name, t.gettext("no answer yet")
     if seen.error:

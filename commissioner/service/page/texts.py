@@ -87,9 +87,10 @@ class Texts:
         return "," if self.language == "de" else "."
 
     def _value(self, text: str) -> str:
-        """What stood in a sentence's gap: a word that is known, or as it was, its numbers with this language's mark. An address, a
+        """What stood in a sentence's gap: words that are known, or as it was, its numbers with this language's mark. An address, a
         version of three parts and a file's name are no number."""
-        said = self._catalogue.messages.get(text, text)
+        known = self._catalogue.messages
+        said = known.get(text) or ", ".join(known.get(word, word) for word in text.split(", "))
         return (
             re.sub(r"(?<![\w./])(\d+)\.(\d+(?:e[+-]?\d+)?)(?![\w./])", r"\1,\2", said)
             if self.language == "de"

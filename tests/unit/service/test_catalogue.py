@@ -11,6 +11,8 @@ from jinja2.ext import extract_from_ast
 
 import commissioner
 from commissioner.diagnose.causes import CATALOGUE
+from commissioner.link.files.drive_file import known_drives, load_profile
+from commissioner.procedure.tuned import TuneVerdict
 from commissioner.service.page import band, frame, texts, words
 from commissioner.service.page.texts import Texts
 from commissioner.service.simulator import SCENARIOS
@@ -108,6 +110,14 @@ def core_sentences():
             yield from ((path.name, text) for text in found if " " in text and not NOT_SHOWN.search(text))
 
 
+def of_tunings():
+    """What the drive files say to whoever stands at the drive, and what is said of every tuning."""
+    for name in known_drives():
+        if (tuning := load_profile(name).tuning) is not None:
+            yield from (tuning.energises, tuning.proof, *(step.text for step in tuning.steps if step.text))
+    yield from (TuneVerdict((), (), {}, names).reason for names in ((), ("stator_resistance", "no_load_current")))
+
+
 def test_every_message_of_templates_scripts_and_pages_has_its_translation(catalogue):
     wanted = {*template_messages(), *script_messages(), *python_messages(), *names()}
     assert len(wanted) > 400
@@ -126,6 +136,13 @@ def test_every_sentence_of_checks_guards_and_refusals_has_its_translation():
         {f"{place}: {text}" for place, text in core_sentences() if not german.knows(text.removesuffix(", degC"))}
     )
     assert missing == []
+
+
+def test_what_is_said_of_a_drives_own_tuning_has_its_translation():
+    """Above all that nobody may be at the motor."""
+    told = {sentence: Texts("de").tell(sentence) for sentence in of_tunings()}
+    assert len(told) > 10
+    assert [sentence for sentence, german in told.items() if german == sentence or "stator" in german] == []
 
 
 def test_a_translation_fills_the_gaps_of_its_message(catalogue):
