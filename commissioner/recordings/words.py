@@ -63,7 +63,11 @@ TRANSLATED = {
 
 def folded(text: str) -> str:
     """The text without marks above and below its letters: `Fréquence` as `Frequence`, `akım` as `akim`, `außen` as `aussen`."""
-    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c)).replace("ı", "i").replace("ß", "ss")
+    return (
+        "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+        .replace("ı", "i")
+        .replace("ß", "ss")
+    )
 
 
 def translated(name: str) -> str:

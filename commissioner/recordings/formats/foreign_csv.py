@@ -112,7 +112,11 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
         columns.append(values if said is None else said)
         notes += () if said is None else unknown(cells, said)
         if wrong and said is None and np.isfinite(values).any() and meaning_of(name) != "time_s":
-            notes.append(ReadingNote("no_number", f"{len(wrong)} cells of {name} are no number, as {wrong[0][:40]!r}: they were left out"))
+            notes.append(
+                ReadingNote(
+                    "no_number", f"{len(wrong)} cells of {name} are no number, as {wrong[0][:40]!r}: they were left out"
+                )
+            )
     if wrong_rows:
         _require_footer(wrong_rows, rows, source)
         notes.append(ReadingNote("footer", f"{len(wrong_rows)} rows that are no row of the table were left out"))
