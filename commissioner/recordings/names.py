@@ -212,7 +212,13 @@ def in_company(names: Sequence[str]) -> dict[str, str]:
 def _is_unit_alone(name: str, names: Sequence[str]) -> bool:
     """Whether the unit of a name is the only phase that it says, and no other phase is called so."""
     unit, bare = unit_in(name).lower(), IN_NAME.sub("", name).strip().lower()
-    if not bare or unit not in PHASES or read_unit(unit) is None or meaning_of(bare) is not None:
+    if (
+        not bare
+        or unit not in PHASES
+        or read_unit(unit) is None
+        or meaning_of(bare) is not None
+        or meaning_of(name) is None
+    ):
         return False
     rests = {re.sub(r"[^a-z0-9]", "", other.lower()[len(bare) :]) for other in names if other.lower().startswith(bare)}
     return not any({unit, rest} <= set(letters) for letters in ALPHABETS for rest in rests - {unit})
