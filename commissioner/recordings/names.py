@@ -200,9 +200,32 @@ def uses_ryb(names: Iterable[str]) -> bool:
     return len(letters) > 1 and ("y" in letters or not any(map(_OTHERS.search, bare)))
 
 
-def in_rst(name: str) -> str:
-    """A name whose phases are R, Y, B, with R, S, T in their place."""
-    return _COLOURED.sub(lambda found: found[1] + _letters(found[2]).translate(_RYB_AS_RST), name)
+def in_company(names: Sequence[str]) -> dict[str, str]:
+    """The names as they are to be read beside each other: phases that are called R, Y, B with R, S, T in their place, and without
+    a unit that only a phase of its own name could be (`Current (A)` where there is no `Current (B)`)."""
+    ours = [translated(name) for name in names]
+    if uses_ryb(ours):
+        return dict(zip(names, (_COLOURED.sub(_as_rst, name) for name in ours), strict=True))
+    return {name: IN_NAME.sub("", name).strip() if _is_unit_alone(name, names) else name for name in names}
+
+
+def _is_unit_alone(name: str, names: Sequence[str]) -> bool:
+    """Whether the unit of a name is the only phase that it says, and no other phase is called so."""
+    unit, bare = unit_in(name).lower(), IN_NAME.sub("", name).strip().lower()
+    if (
+        not bare
+        or unit not in PHASES
+        or read_unit(unit) is None
+        or meaning_of(bare) is not None
+        or meaning_of(name) is None
+    ):
+        return False
+    rests = {re.sub(r"[^a-z0-9]", "", other.lower()[len(bare) :]) for other in names if other.lower().startswith(bare)}
+    return not any({unit, rest} <= set(letters) for letters in ALPHABETS for rest in rests - {unit})
+
+
+def _as_rst(found: re.Match[str]) -> str:
+    return found[1] + _letters(found[2]).translate(_RYB_AS_RST)
 
 
 def _letters(said: str) -> str:
@@ -226,7 +249,7 @@ def key_of(name: str) -> str:
 
 def meanings_of(names: Sequence[str]) -> dict[str, str]:
     """Names that mean a column of the contract, by what their letters are in this company, with that column."""
-    meant = {name: in_rst(name) for name in names} if uses_ryb(names) else {name: name for name in names}
+    meant = in_company(names)
     with_s = uses_rst(n for n in meant.values() if n)
     found = {name: meaning_of(own, with_s) for name, own in meant.items() if name}
     return {name: meaning for name, meaning in found.items() if meaning is not None}

@@ -17,7 +17,7 @@ BASE = {
 }  # fmt: skip
 """Unit without prefix, in lower case, and what it measures."""
 WHOLE = {
-    "rad/s": ("speed", 1.0), "rads": ("speed", 1.0), "1/s": ("frequency", 1.0), "rpm": ("speed", math.pi / 30),
+    "rad/s": ("speed", 1.0), "rads": ("speed", 1.0), "1/s": ("frequency", 1.0), "rpm": ("speed", math.pi / 30), "krpm": ("speed", 1e3 * math.pi / 30),
     "1/min": ("speed", math.pi / 30), "min-1": ("speed", math.pi / 30), "r/min": ("speed", math.pi / 30),
     "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "giri/min": ("speed", math.pi / 30), "min⁻¹": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),

@@ -62,8 +62,12 @@ TRANSLATED = {
 
 
 def folded(text: str) -> str:
-    """The text without marks above and below its letters: `Fréquence` as `Frequence`, `akım` as `akim`."""
-    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c)).replace("ı", "i")
+    """The text without marks above and below its letters: `Fréquence` as `Frequence`, `akım` as `akim`, `außen` as `aussen`."""
+    return (
+        "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+        .replace("ı", "i")
+        .replace("ß", "ss")
+    )
 
 
 def translated(name: str) -> str:

@@ -105,12 +105,18 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     columns = []
     filled = np.zeros(table.num_rows, dtype=np.int64)
     for name, column in zip(layout.names, table.columns, strict=True):
-        values, _ = to_numbers(column, marks)
+        values, wrong = to_numbers(column, marks, source)
         filled += np.isfinite(values)
         cells = [str(cell) for cell in column.to_pylist()] if is_title(name) else []
         said = codes(cells)
         columns.append(values if said is None else said)
         notes += () if said is None else unknown(cells, said)
+        if wrong and said is None and np.isfinite(values).any() and meaning_of(name) != "time_s":
+            notes.append(
+                ReadingNote(
+                    "no_number", f"{len(wrong)} cells of {name} are no number, as {wrong[0][:40]!r}: they were left out"
+                )
+            )
     if wrong_rows:
         _require_footer(wrong_rows, rows, source)
         notes.append(ReadingNote("footer", f"{len(wrong_rows)} rows that are no row of the table were left out"))

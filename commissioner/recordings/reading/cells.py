@@ -17,9 +17,13 @@ NOTHING = frozenset(
      "ol", "-ol", "over", "under", "overflow", "overload", "#nv", "#n/a", "1.#inf", "-1.#inf", "1.#qnan", "********", "nv"}
 )  # fmt: skip
 """What stands in a cell that holds no number, in lower case."""
-NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
-APOSTROPHE = re.compile(r"(?<=\d)['\u2019](?=\d{3}(?!\d))")
-"""Between thousands, as in Switzerland."""
+NUMBER = re.compile(
+    r"[+-]?(?:\d+[.,]?\d*|[.,]\d+|\d{1,3}(?:,\d{2,3})*,\d{3}(?:\.\d*)?|\d{1,3}(?:\.\d{3})+(?:,\d*)?)(?:[eEdD][+-]?\d+)?"
+)
+GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?: \d{3})+(?:[.,]\d*)?(?:[eEdD][+-]?\d+)?")
+"""A number with spaces between its thousands, as in France."""
+BETWEEN_THOUSANDS = re.compile(r"(?<=\d)['\u2019\u00a0\u2009\u202f](?=\d{3}(?!\d))")
+"""An apostrophe, as in Switzerland, or a space that breaks no line."""
 CLOCK = re.compile(
     r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{2,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2})([.,:]\d+)?(?:Z|[+-]\d{2}:?\d{2})?"
 )
@@ -32,11 +36,21 @@ class Marks:
     decimal: str = "."
     thousands: str = ""
 
+    @property
+    def other(self) -> str:
+        """The mark that is not the decimal one."""
+        return "." if self.decimal == "," else ","
+
 
 def plain(text: str) -> str:
-    """The text with a hyphen for the minus sign, and without apostrophes between thousands: both can be read in one way only."""
+    """The text with a hyphen for the minus sign, and without what can only stand between thousands: both can be read in one way only."""
     text = text.replace("\u2212", "-")
-    return APOSTROPHE.sub("", text) if "'" in text or "\u2019" in text else text
+    return text if text.isascii() and "'" not in text else BETWEEN_THOUSANDS.sub("", text)
+
+
+def ungrouped(cell: str) -> str:
+    """A number without the spaces between its thousands; any other cell as it is."""
+    return cell.replace(" ", "") if GROUPED.fullmatch(cell) else cell
 
 
 def is_numeric(cell: str) -> bool:
@@ -65,7 +79,7 @@ def marks_of(cells: list[str], separator: str, source: str) -> Marks:
         return Marks()
     if any(c.count(",") > 1 for c in with_comma):
         return Marks(".", ",")
-    if all(_is_grouped(c, ",") for c in with_comma) and separator != ";":
+    if all(_is_grouped(c, ",") for c in with_comma) and (separator != ";" or with_point):
         raise _ambiguous(with_comma[0], source)
     if with_point and all(_is_grouped(c, ".") for c in with_point) and any(_is_grouped(c, ".") for c in with_point):
         raise _ambiguous(with_point[0], source)
@@ -80,24 +94,46 @@ def _is_grouped(cell: str, mark: str) -> bool:
 
 def _ambiguous(cell: str, source: str) -> DataRefused:
     return DataRefused(
-        f"{source}: {cell} may be thousands or a number with three decimals", step="read numbers", value=cell,
+        f"{source}: {cell} may be thousands or a number with decimals", step="read numbers", value=cell,
         limit="one decimal mark, and no marks between thousands", remedy="export again without marks between thousands",
     )  # fmt: skip
 
 
-def to_numbers(column: pa.ChunkedArray, marks: Marks) -> tuple[Signal, int]:
-    """The column as float64, not a number where a cell holds none; and how many cells are neither number nor nothing."""
+def to_numbers(column: pa.ChunkedArray, marks: Marks, source: str) -> tuple[Signal, list[str]]:
+    """The column as float64, not a number where a cell holds none; and the cells that are neither number nor nothing.
+    DataRefused: a number that is one thing by the file's marks and another by its looks."""
     text = pc.utf8_trim_whitespace(column.cast(pa.string()).combine_chunks())
     if isinstance(text, pa.ChunkedArray):
         text = text.combine_chunks()
-    if marks.thousands:
-        text = pc.replace_substring(text, marks.thousands, "")
-    if marks.decimal == ",":
-        text = pc.replace_substring(text, ",", ".")
-    try:
-        return _cast(pc.if_else(pc.equal(text, ""), pa.scalar(None, pa.string()), text)), 0
-    except pa.ArrowInvalid:
-        return _one_by_one(text)
+    marks = _of_column(text, marks)
+    is_grouped = _has(text, re.escape(marks.other))
+    if not is_grouped or (marks.thousands and not _has(text, _not_between_thousands(marks.thousands))):
+        bare = pc.replace_substring(text, marks.other, "") if is_grouped else text
+        bare = pc.replace_substring(bare, ",", ".") if marks.decimal == "," else bare
+        try:
+            return _cast(pc.if_else(pc.equal(bare, ""), pa.scalar(None, pa.string()), bare)), []
+        except pa.ArrowInvalid:
+            pass
+    return _one_by_one(text, marks, source)
+
+
+def _of_column(text: pa.Array, marks: Marks) -> Marks:
+    """The marks of a column that has the other one for its decimals throughout (a time with points beside values with commas)."""
+    is_other = not _has(text, re.escape(marks.decimal)) and _has(text, _of_decimals(marks.other))
+    return Marks(marks.other) if is_other else marks
+
+
+def _has(text: pa.Array, pattern: str) -> bool:
+    return bool(pc.any(pc.match_substring_regex(text, pattern)).as_py())
+
+
+def _of_decimals(mark: str) -> str:
+    """A number with one such mark, which does not stand before three digits as between thousands."""
+    return rf"^[+-]?(?:0\d*[{mark}]\d*|\d{{4,}}[{mark}]\d*|[{mark}]\d+|\d+[{mark}](?:\d{{0,2}}|\d{{4,}}))(?:[eEdD][+-]?\d+)?$"
+
+
+def _not_between_thousands(mark: str) -> str:
+    return rf"[{mark}](?:\d{{0,2}}(?:\D|$)|\d{{4}})|^[+-]?0*[{mark}]|\d{{4}}[{mark}]"
 
 
 def _cast(text: pa.Array) -> Signal:
@@ -105,19 +141,33 @@ def _cast(text: pa.Array) -> Signal:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _one_by_one(text: pa.Array) -> tuple[Signal, int]:
-    values, wrong = np.full(len(text), np.nan), 0
-    for k, cell in enumerate(text.to_pylist()):
-        bare = (cell or "").strip().strip('"').lower()
-        if bare in NOTHING:
+def _one_by_one(text: pa.Array, marks: Marks, source: str) -> tuple[Signal, list[str]]:
+    values, wrong = np.full(len(text), np.nan), []
+    for k, whole in enumerate(text.to_pylist()):
+        cell = ungrouped((whole or "").strip().strip('"').strip())
+        if cell.lower() in NOTHING:
             continue
-        clock = CLOCK.fullmatch(bare.upper())
+        clock = CLOCK.fullmatch(cell.upper())
         try:
-            values[k] = clock_seconds(clock) if clock else float(bare.replace("d", "e"))
+            values[k] = clock_seconds(clock) if clock else _number(cell, marks, source)
         except ValueError:
-            wrong += 1
+            wrong.append(cell)
     values[~np.isfinite(values)] = np.nan
     return values, wrong
+
+
+def _number(cell: str, marks: Marks, source: str) -> float:
+    """The number in a cell; ValueError where it is none, DataRefused where its marks leave open which."""
+    if not NUMBER.fullmatch(cell):
+        raise ValueError(cell)
+    if marks.other in cell:
+        is_open = marks.decimal not in cell and not marks.thousands
+        is_misfit = re.search(_not_between_thousands(marks.other), cell.partition(marks.decimal)[0])
+        if (is_open or is_misfit) and cell.count(marks.other) == 1:
+            raise _ambiguous(cell, source)
+        if is_misfit:
+            raise ValueError(cell)
+    return float(cell.replace(marks.other, "").replace(marks.decimal, ".").lower().replace("d", "e"))
 
 
 def clock_seconds(found: re.Match[str]) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_COLUMNS
 from commissioner.recordings.names import meaning_of
-from commissioner.recordings.reading.cells import is_number, is_numeric
+from commissioner.recordings.reading.cells import is_number, is_numeric, ungrouped
 from commissioner.recordings.reading.preface import SIGNS
 from commissioner.recordings.units import is_unit, read_unit, unit_in
 
@@ -74,9 +74,10 @@ def split(line: str, separator: str) -> Row:
     if separator == " ":
         return line.split()
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
     except csv.Error:
         return []
+    return cells if separator == "," else [ungrouped(cell) for cell in cells]
 
 
 def _said(line: str, separator: str) -> Row:

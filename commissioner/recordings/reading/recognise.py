@@ -13,7 +13,7 @@ from commissioner.errors import DataRefused
 from commissioner.recordings.catalogue.names import key_of as key_of_plate
 from commissioner.recordings.names import (
     counted_from_zero,
-    in_rst,
+    in_company,
     is_per_minute,
     is_remark,
     meaning_of,
@@ -21,7 +21,6 @@ from commissioner.recordings.names import (
     turned,
     unit_of,
     uses_rst,
-    uses_ryb,
 )
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.reading.said_tests import is_title
@@ -54,7 +53,7 @@ def recognise(
     names: Sequence[str], units: Sequence[str], values: Sequence[Signal], targets: Mapping[str, Target], source: str
 ) -> Recognised:
     """The columns by the contract's names where they mean one, else by their own; see the module."""
-    meant = {name: in_rst(name) for name in names} if uses_ryb(names) else {name: name for name in names}
+    meant = in_company(names)
     with_s = uses_rst([n for n in meant.values() if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
     of_points = sheet_columns(names) if of_sheet else {}
