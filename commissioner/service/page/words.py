@@ -67,6 +67,12 @@ class Words:
     def __init__(self, texts: Texts) -> None:
         self._t = texts
 
+    def circuit(self, key: str, *values: float) -> str:
+        """Values of one of the circuit's, in SI, as people read them: `214 mH`, `4 … 90 mH`."""
+        quantity = next(q for q in QUANTITIES if q.key == key)
+        *first, last = (quantity.factor * value for value in values)
+        return " … ".join([*map(self._t.short, first), self._t.short(last, quantity.unit)])
+
     def check_name(self, name: str) -> str:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
         return capitalised(self._t.tell(check_name(name)))

@@ -99,3 +99,9 @@ def test_a_value_in_words_has_the_readers_decimal_mark_and_a_key_keeps_its_lette
         german.sentence("x.csv: a standstill recording needs the column segment")
         == "x.csv: einer Aufzeichnung im Stillstand fehlt die Spalte segment"
     )
+
+
+def test_a_value_of_the_circuit_is_told_in_the_unit_that_people_read():
+    german = Words(Texts("de"))
+    assert german.circuit("leakage_inductance_h", 0.0215) == "21,5\u00a0mH"
+    assert german.circuit("stator_resistance_ohm", 0.2956, 9.853) == "0,2956 … 9,853\u00a0Ω"
