@@ -198,10 +198,8 @@ def stands_out(spectrum: PairSpectrum, frequency_hz: float) -> bool:
     )
     if not slower:
         return True
-    own, beside = (
-        float(spectrum.at(frequency_hz, 0.3)[0]),
-        float(spectrum.at(frequency_hz + slower[0][0] * NEIGHBOURS).max()),
-    )
+    own = float(spectrum.at(frequency_hz, 0.3)[0])
+    beside = float(spectrum.at(frequency_hz + slower[0][0] * NEIGHBOURS).max())
     return own > VISIBLE and (beside < VISIBLE or own > OUT_OF_COMB * beside)
 
 
