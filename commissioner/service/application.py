@@ -34,9 +34,10 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     """The service as an ASGI application; it starts its children when it begins and leaves none behind."""
 
     @contextlib.asynccontextmanager
-    async def lifetime(_app: FastAPI) -> AsyncIterator[None]:
-        tasks = [asyncio.create_task(parts.desk.look_around()), asyncio.create_task(parts.warm.work())]
-        tasks.append(asyncio.create_task(_prepare()))
+    async def lifetime(app: FastAPI) -> AsyncIterator[None]:
+        _prepare(app)
+        work = (parts.desk.look_around(), parts.warm.work(), _prepare_causes())
+        tasks = [asyncio.create_task(task) for task in work]
         tell = asyncio.get_running_loop().call_later(0.0, ready)
         try:
             yield
@@ -86,8 +87,14 @@ def _refuse_upload(request: Request) -> Response | None:
     return None
 
 
-async def _prepare() -> None:
-    await asyncio.to_thread(prepare)
+def _prepare(app: FastAPI) -> None:
+    """What the first request would build, before one is answered: later it would hold up the beat of a run that has begun."""
+    prepare()
+    for route in app.routes:  # FastAPI makes the checks of a router's requests when it first compares a path with them
+        route.matches({"type": "http", "method": "GET", "path": "/", "root_path": ""})
+
+
+async def _prepare_causes() -> None:
     await asyncio.sleep(CAUSES_S)
     await asyncio.to_thread(prepare_causes)
 

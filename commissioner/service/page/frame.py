@@ -68,7 +68,7 @@ def words_of(language: str) -> Mapping[str, Callable[..., Any] | Texts | Words]:
 
 
 def prepare() -> None:
-    """Compile every template and read every catalogue: in a thread, so that the first page does not hold up a run's beat."""
+    """Compile every template and read every catalogue."""
     for name in environment().list_templates(extensions=["html"]):
         environment().get_template(name)
     for language in LANGUAGES:
@@ -76,7 +76,7 @@ def prepare() -> None:
 
 
 def prepare_causes() -> None:
-    """The names of causes, which bring numba along: in a thread as well, once the first page is out."""
+    """The names of causes, which bring numba along: in a thread, once the first page is out."""
     import commissioner.diagnose.causes  # noqa: F401
 
 
