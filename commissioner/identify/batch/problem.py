@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,12 +120,30 @@ class Problem:
         """Whether the sensitivities of this evaluation are kept."""
         return near.information is self._rows_of
 
+    def sensitivities(self, theta: Matrix, own: Matrix) -> tuple[Matrix, list[tuple[NDArray[np.int64], Matrix]]]:
+        """Information (total, total), and what it is the sum of: of each segment the numbers it depends on, and how (samples, numbers).
+        Of a record too long to keep them its segments' beginnings."""
+        width, samples = self.model.size + OWN, sum(s.current_a.size for s in self.segments)
+        share = min(1.0, MOST_KEPT / (width * samples))
+        begun = Problem([_beginning(s, share) for s in self.segments], self.period_s, self.model, is_coarse=True)
+        begun.plateau_v = self.plateau_v
+        information = begun.evaluate(theta, own, is_general=True).information
+        for rows in begun._rows:
+            rows[:, DELAY] /= self.period_s
+        return information, list(zip(begun.columns, begun._rows, strict=True))
+
     def evaluate(
-        self, theta: Matrix, own: Matrix, over: Evaluation | None = None, near: Evaluation | None = None
+        self,
+        theta: Matrix,
+        own: Matrix,
+        over: Evaluation | None = None,
+        near: Evaluation | None = None,
+        *,
+        is_general: bool = False,
     ) -> Evaluation:
         """All segments simulated; the signals of `over`, which is not needed any more, are written over. With the sensitivities of
-        `near`, where they are kept: under half the time."""
-        is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0
+        `near`, where they are kept: under half the time. `is_general`: with sensitivities also where two modes would do."""
+        is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0 and not is_general
         is_near = near is not None and self.knows(near)
         held = () if is_linear else self._held(theta[:CIRCUIT], is_linearised=not is_near)
         information = near.information if near is not None and is_near else np.zeros((self.total, self.total))
@@ -250,6 +268,15 @@ class Problem:
         """For the sensitivities of every sample, or where these are too many of a stretch."""
         width = self.model.size + OWN
         return [np.empty((s.current_a.size if self._keeps else ROWS, width)) for s in self.segments]
+
+
+def _beginning(segment: Segment, share: float) -> Segment:
+    """This share of its samples."""
+    if share >= 1.0:
+        return segment
+    n = max(int(share * segment.current_a.size), 1)
+    weight = None if segment.weight is None else segment.weight[:n]
+    return replace(segment, voltage_v=segment.voltage_v[:n], current_a=segment.current_a[:n], weight=weight)
 
 
 def _from_zero(table: Matrix) -> Matrix:

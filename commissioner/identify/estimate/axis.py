@@ -13,6 +13,7 @@ from commissioner.compiled import writable
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.flicker import widened
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.identify.batch.starts import from_impedance
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
@@ -99,7 +100,7 @@ def fit_axis(
         # what was taken for settled levels was none: begin as if there were none
         fit = _fitted(stretches, None, plate, period_s, guess, None)
         require_conditioned(fit.batch)
-    return fit
+    return replace(fit, batch=widened(fit.batch, segments(fit.stretches)))
 
 
 def _fitted(

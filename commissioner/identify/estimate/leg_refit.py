@@ -17,6 +17,7 @@ from scipy.special import chdtrc
 
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.flicker import widened
 from commissioner.identify.batch.model import Matrix
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair
@@ -98,9 +99,10 @@ def _fitted(begun: BatchFit, segments: Sequence[Segment], law: PairLaw, values: 
     theta[: model.leg_slice.start] = begun.theta[: begun.model.leg_slice.start]
     theta[model.leg_slice] = law.admissible(values)
     start = begun.gamma.as_inverse_gamma()
-    return fit_segments(
+    fit = fit_segments(
         segments, begun.sample_period_s, start, model, theta, STEPS, TOLERANCE, begun.own, is_coarse=is_coarse
     )
+    return fit if is_coarse else widened(fit, segments)
 
 
 def _fit_all(fits: Sequence[BatchFit], tests: Sequence[Sequence[Segment]], first: BatchFit) -> _Refit | None:
