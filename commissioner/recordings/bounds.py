@@ -21,6 +21,10 @@ made-up ones by more, and those can be saved unpacked."""
 NUMBER_BYTES = 8
 """A float64: what every number of a file becomes, however short it was."""
 _CHUNK = 1 << 20
+_FIXED = (
+    pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_timestamp, pa.types.is_time, pa.types.is_duration,
+)  # fmt: skip
+"""Types of columns that are numbers or times, each of a fixed size."""
 
 
 def unpacked_limit(path: Path) -> int:
@@ -55,14 +59,14 @@ def bounded_text(path: Path, limit: int = MAX_BYTES) -> bytes:
 
 
 def numeric_columns(path: Path, file: pa_parquet.ParquetFile) -> list[str]:
-    """The columns that are numbers: texts, lists and dictionaries can unpack to any size and are never read.
+    """The columns that are numbers or times: texts, lists and dictionaries can unpack to any size and are never read.
 
     A chunk's metadata are looked at only where its first row could be read: Arrow's own look at damaged ones ends the process.
     """
     if file.metadata.num_columns > MAX_COLUMNS:
         raise too_large(path, f"{file.metadata.num_columns} columns", MAX_COLUMNS)
     schema = file.schema_arrow
-    names = [f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)]
+    names = [f.name for f in schema if any(kind(f.type) for kind in _FIXED)]
     groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
     rows = max(sum(max(group.num_rows, 0) for group in groups), file.metadata.num_rows)
     limit = unpacked_limit(path)

@@ -18,7 +18,7 @@ import numpy as np
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import Nameplate
 from commissioner.paths import no_file
-from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms, workbook
+from commissioner.recordings.formats import comtrade, mdf4, structures, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
@@ -27,6 +27,7 @@ from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
 from commissioner.recordings.reading.mend import (
     TIME_MADE,
     against_interval,
+    from_days,
     require_seconds,
     require_stamps,
     through_midnight,
@@ -54,7 +55,7 @@ from commissioner.recordings.units import unit_in
 from commissioner.records import ReadingNote, RunningRecording, Signal
 
 _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]]] = {
-    ".mat": lambda path: (*matlab.variables(path), ()),
+    ".mat": structures.channels,
     ".tdms": lambda path: (*tdms.channels(path), ()),
     ".mf4": lambda path: (mdf4.channels(path), {}, ()),
     ".cfg": comtrade.channels,
@@ -259,7 +260,8 @@ def _timed(
         require_stamps(columns, source)
         columns, untimed = without_untimed_rows(columns)
         columns, midnight = through_midnight(columns)
-        notes = [*untimed, *midnight, *against_interval(columns, clock, readings, source)]
+        columns, days = from_days(columns)
+        notes = [*untimed, *midnight, *days, *against_interval(columns, clock, readings, source)]
     if "time_s" not in columns or not any(name.startswith("current_") for name in columns):
         return columns, notes
     columns, doubled = without_doubled_rows(columns)

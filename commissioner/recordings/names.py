@@ -91,6 +91,20 @@ TIME = frozenset(
         "timesec",
         "zeitstempel",
         "uhrzeit",
+        "datetime",
+        "dateandtime",
+        "datumuhrzeit",
+        "datumzeit",
+        "datumunduhrzeit",
+        "fechahora",
+        "fechayhora",
+        "hora",
+        "dateheure",
+        "dateetheure",
+        "heure",
+        "horodatage",
+        "dataora",
+        "ora",
     }
 )
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
@@ -211,7 +225,8 @@ def in_company(names: Sequence[str]) -> dict[str, str]:
 
 def _is_unit_alone(name: str, names: Sequence[str]) -> bool:
     """Whether the unit of a name is the only phase that it says, and no other phase is called so."""
-    unit, bare = unit_in(name).lower(), IN_NAME.sub("", name).strip().lower()
+    own, *others = (_without_path(one).lower() for one in (name, *names))
+    unit, bare = unit_in(name).lower(), IN_NAME.sub("", own).strip()
     if (
         not bare
         or unit not in PHASES
@@ -220,7 +235,8 @@ def _is_unit_alone(name: str, names: Sequence[str]) -> bool:
         or meaning_of(name) is None
     ):
         return False
-    rests = {re.sub(r"[^a-z0-9]", "", other.lower()[len(bare) :]) for other in names if other.lower().startswith(bare)}
+    called = {form for other in others for form in (other, without_brackets(other)) if form.startswith(bare)}
+    rests = {re.sub(r"[^a-z0-9]", "", form[len(bare) :]) for form in called}
     return not any({unit, rest} <= set(letters) for letters in ALPHABETS for rest in rests - {unit})
 
 
@@ -243,8 +259,12 @@ def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
 
 def key_of(name: str) -> str:
     """Letters and digits of a name, without accents, its unit in brackets and its path."""
-    bare = without_brackets(name.rsplit(".", maxsplit=1)[-1])
+    bare = without_brackets(_without_path(name))
     return re.sub(r"[^a-z0-9]", "", folded(bare).lower())
+
+
+def _without_path(name: str) -> str:
+    return name.rsplit(".", maxsplit=1)[-1]
 
 
 def meanings_of(names: Sequence[str]) -> dict[str, str]:

@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from commissioner.errors import DataRefused, UsageError
 from commissioner.motor.computed import COMPUTED, printed_step, without_computed_third
 from commissioner.paths import no_file
-from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
+from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, too_large
+from commissioner.recordings.formats.parquet import columns_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.said_tests import codes, is_title, unknown
 from commissioner.recordings.reading.slow_columns import currents_on_the_commands_clock, on_one_clock
@@ -360,13 +361,14 @@ def _read_parquet(path: Path) -> Table:
     file = pa_parquet.ParquetFile(path)
     if path.stat().st_size > MAX_BYTES:
         raise too_large(path, path.stat().st_size, MAX_BYTES)
-    numeric = numeric_columns(path, file)
+    columns, lost, notes = columns_of(path, file)
     for name in file.schema_arrow.names:
-        if name in CONTRACT_COLUMNS and name not in numeric:
+        if name in lost or (name in CONTRACT_COLUMNS and pa.types.is_nested(file.schema_arrow.field(name).type)):
             raise _not_numeric(path, name, file.schema_arrow.field(name).type)
     raw = file.schema_arrow.metadata or {}
     metadata = {k.decode(): v.decode() for k, v in raw.items() if not k.startswith((b"ARROW", b"pandas"))}
-    return _as_table(path, file.read(columns=numeric), typed_metadata(path, metadata))
+    table = _as_table(path, columns, typed_metadata(path, metadata))
+    return replace(table, notes=(*table.notes, *notes))
 
 
 def _read_csv(path: Path) -> Table:
@@ -395,6 +397,14 @@ def _read_csv(path: Path) -> Table:
 
 
 def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) -> Table:
+    if table.num_columns == 0:
+        raise _refuse(
+            path,
+            "no column holds plain numbers",
+            0,
+            "a column of numbers for each signal",
+            "unpack structures and lists",
+        )
     if table.num_rows == 0:
         raise _refuse(path, "the file has no rows", 0, "at least 2 rows", "record again")
     columns: dict[str, Signal] = {}

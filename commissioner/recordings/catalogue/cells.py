@@ -10,18 +10,18 @@ from commissioner.identify.catalogue.sheet import KEYS, Value
 NUMBER = r"[-+]?(?:\d{1,3}(?:[ \u00a0\u202f]\d{3})+(?!\d)|\d+)(?:[.,]\d+)?(?:[eE][-+]?\d+)?|[-+]?[.,]\d+"
 PRINTED = re.compile(rf"\s*(?:ca\.?|~|≈)?\s*({NUMBER})\s*(.*)", re.DOTALL)
 UNITS = {
-    "w": 1.0, "kw": 1e3, "mw": 1e6, "hp": 745.7, "ps": 735.5, "cv": 735.5, "bhp": 745.7, "v": 1.0, "kv": 1e3, "vac": 1.0, "a": 1.0, "ka": 1e3,
+    "w": 1.0, "kw": 1e3, "mw": 1e6, "hp": 745.7, "ps": 735.5, "cv": 735.5, "bhp": 745.7, "v": 1.0, "kv": 1e3, "vac": 1.0, "a": 1.0, "ma": 1e-3, "ka": 1e3,
     "hz": 1.0, "1/min": 1.0, "rpm": 1.0, "min-1": 1.0, "min^-1": 1.0, "u/min": 1.0, "r/min": 1.0, "tr/min": 1.0, "giri/min": 1.0, "/min": 1.0,
-    "min⁻¹": 1.0, "nm": 1.0, "knm": 1e3, "kgm": 9.80665, "kpm": 9.80665, "kgfm": 9.80665, "lbft": 1.35582, "lb-ft": 1.35582,
-    "ftlb": 1.35582, "ohm": 1.0, "ω": 1.0, "mohm": 1e-3, "mω": 1e-3, "kgm2": 1.0, "kgm²": 1.0, "kgm^2": 1.0, "gm2": 1e-3, "%": 0.01,
+    "min⁻¹": 1.0, "nm": 1.0, "knm": 1e3, "kgm": 9.80665, "kpm": 9.80665, "kgfm": 9.80665, "danm": 10.0, "lbft": 1.35582, "lb-ft": 1.35582,
+    "ftlb": 1.35582, "ohm": 1.0, "ω": 1.0, "mohm": 1e-3, "mω": 1e-3, "kgm2": 1.0, "kgm²": 1.0, "kgm^2": 1.0, "gm2": 1e-3, "gm²": 1e-3, "kgcm2": 1e-4, "kgcm²": 1e-4, "%": 0.01,
     "pu": 1.0, "p.u.": 1.0, "degc": 1.0, "°c": 1.0, "c": 1.0, "": 1.0, "-": 1.0, "x": 1.0, "xin": 1.0, "xmn": 1.0,
 }  # fmt: skip
 """Factors to the unit of the key."""
 MEASURES = {
-    "W": {"w", "kw", "mw", "hp", "ps", "cv", "bhp"}, "V": {"v", "kv", "vac"}, "A": {"a", "ka"}, "Hz": {"hz"},
+    "W": {"w", "kw", "mw", "hp", "ps", "cv", "bhp"}, "V": {"v", "kv", "vac"}, "A": {"a", "ma", "ka"}, "Hz": {"hz"},
     "1/min": {"1/min", "rpm", "min-1", "min^-1", "u/min", "r/min", "tr/min", "giri/min", "/min", "min⁻¹"},
-    "N m": {"nm", "knm", "kgm", "kpm", "kgfm", "lbft", "lb-ft", "ftlb"}, "ohm": {"ohm", "ω", "mohm", "mω"},
-    "kg m2": {"kgm2", "kgm²", "kgm^2", "gm2"}, "degC": {"degc", "°c", "c"}, "": {"%", "pu", "p.u.", "x", "xin", "xmn"},
+    "N m": {"nm", "knm", "kgm", "kpm", "kgfm", "danm", "lbft", "lb-ft", "ftlb"}, "ohm": {"ohm", "ω", "mohm", "mω"},
+    "kg m2": {"kgm2", "kgm²", "kgm^2", "gm2", "gm²", "kgcm2", "kgcm²"}, "degC": {"degc", "°c", "c"}, "": {"%", "pu", "p.u.", "x", "xin", "xmn"},
 }  # fmt: skip
 RANGES = {
     "rated_power_w": (20.0, 20e6), "rated_voltage_v": (24.0, 15e3), "rated_frequency_hz": (5.0, 1000.0), "rated_speed_rpm": (50.0, 60e3),
@@ -45,7 +45,7 @@ def split_unit(printed: str) -> tuple[str, str] | None:
 
 def unit_key(unit: str) -> str:
     """A unit without spaces, dots and brackets, in lower case."""
-    return re.sub(r"[\s·*\[\]()]", "", unit).lower().rstrip(";,")
+    return re.sub(r"[\s·*\[\]()]|(?<=g)\.(?=m)", "", unit).lower().rstrip(";,")
 
 
 def value_of(key: str, number: str, unit: str, name: str, source: str) -> Value:

@@ -31,8 +31,8 @@ NAMES = {
     "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mt](?:s|u|pu)|c(?:u|pu)){_OVER}",
     "no_load_current_a": r"(?:noload|idle|leerlauf)(?:current|strom)|i0",
     "inertia_kg_m2": r"(?:rotor|mass|massen)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)|momentofinertiaj|j|jm|jmot|jrotor",
-    "winding_resistance": r"(?:winding|stator|phase|wicklungs|strang|klemmen|terminal)?(?:resistance|widerstand)\w*|r(?:uv|1|s|ph)\w*",
-    "winding_temperature_c": r"(?:winding|resistance|wicklungs)temperatu?re?|temperature|temperatur",
+    "winding_resistance": r"(?:winding|stator|stander|phase|wicklungs|strang|klemmen|terminal|line(?:toline)?)?(?:resistance|widerstand)\w*|r(?:uv|1|s|ph)\w*",
+    "winding_temperature_c": r"(?:at|bei|reference|bezugs|mess|winding|resistance|wicklungs)?temperatu?re?|temperatur",
     "pole_pairs": r"pole?pairs?|polpaare|polpaarzahl|numberofpolepairs",
     "poles": r"(?:numberof)?poles?|polzahl|2p",
     "connection": r"connection|schaltung|wiring|wicklungsschaltung",
@@ -115,7 +115,7 @@ def is_ratio(name: str) -> bool:
 def is_between_terminals(name: str) -> bool | None:
     """Of a winding's resistance: between two terminals, of one phase, or unsaid."""
     lower = translated(name).lower()
-    if re.search(r"uv|u-v|terminal|line|klemme|phase[- ]?(?:to[- ]?)?phase|zwischen", lower):
+    if re.search(r"uv|u-v|terminal|line|klemme|phase[- ]?(?:to[- ]?)?phase|zwischen|between", lower):
         return True
     return False if re.search(r"phase|strang|per ph|_ph", lower) else None
 

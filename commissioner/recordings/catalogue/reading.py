@@ -15,7 +15,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS, Sheet, Value
 from commissioner.motor.nameplate import connection_of
 from commissioner.recordings.catalogue import names
-from commissioner.recordings.catalogue.cells import refused, split_unit, unit_key, value_of
+from commissioner.recordings.catalogue.cells import MEASURES, refused, split_unit, unit_key, value_of
 from commissioner.recordings.formats import workbook
 from commissioner.recordings.formats.foreign_csv import read_text
 from commissioner.recordings.names import meaning_of
@@ -40,6 +40,9 @@ PAIR = re.compile(
 )
 """`230/400 V`, `400/690 V D/Y`, `400 V D / 690 V Y`."""
 TRIPLE = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*(%?)[\s;]*$")
+
+_AT = re.compile(r"[\[(,]?\s*(?:\b(?:at|bei|à|a)\s|@)?\s*([-+]?\d+(?:[.,]\d+)?)\s*°\s*C\s*[\])]?", re.IGNORECASE)
+"""The temperature of a winding's resistance, in its name or behind its value."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,9 @@ def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:
 
 def _read(entry: Entry, sheet: Sheet, unsaid: list[str]) -> Iterator[tuple[str, Value]]:
     """The values of one entry, with their keys."""
+    if entry.key == "winding_resistance" and (at := _AT.search(f"{entry.name} {entry.printed}")) is not None:
+        yield "winding_temperature_c", value_of("winding_temperature_c", at[1], "°C", entry.name, sheet.source)
+        entry = replace(entry, name=_AT.sub("", entry.name), printed=_AT.sub("", entry.printed))
     if entry.key in ("efficiency", "power_factor") and (three := TRIPLE.match(entry.printed)):
         unit = three[4] or names.unit_of(entry.name)
         for ending, number in zip(("", "_75", "_50"), three.groups()[:3], strict=True):
@@ -195,7 +201,7 @@ def _whole_key(entry: Entry, unit: str, unsaid: list[str]) -> str:
     """The key with ratio or unit, with terminals or phase; nothing where that is not said."""
     if entry.key in ABSOLUTE:
         ending = "_a" if ABSOLUTE[entry.key] == "rated_current_a" else "_nm"
-        is_absolute = unit_key(unit) in {"a", "ka", "nm", "knm", "kgm", "lbft"} and not names.is_ratio(entry.name)
+        is_absolute = unit_key(unit) in MEASURES["A"] | MEASURES["N m"] and not names.is_ratio(entry.name)
         return entry.key + (ending if is_absolute else "_ratio")
     if entry.key == "winding_resistance":
         between = names.is_between_terminals(entry.name)

@@ -23,6 +23,9 @@ _FORM = "COMTRADE"
 _SECTION = re.compile(rb"^--- file type: ([A-Z]+)([^\r\n]*?)---[ \t]*\r?\n", re.MULTILINE | re.IGNORECASE)
 _SAMPLES = {"BINARY": ("<i2", -0x8000), "BINARY32": ("<i4", -0x80000000), "FLOAT32": ("<f4", None)}
 _MISSING_IN_ASCII = 99999.0
+LEAST_SKEW = 0.01
+"""Of a sample period: channels less apart are sampled together."""
+_NANOSECONDS = re.compile(r":[\d ]+\.\d{9}")
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class _Channel:
     slope: float
     offset: float
     to_primary: float
+    skew_us: float
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,8 @@ class _Configuration:
     promised: int
     """Samples; 0 where it does not say."""
     data_type: str
-    time_factor: float
+    stamp_s: float
+    """What a time stamp counts: micro-, or since 2013 nanoseconds, times the file's factor."""
 
 
 def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]:
@@ -57,7 +62,18 @@ def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], tup
         values = (channel.slope * raw[:, k] + channel.offset) * channel.to_primary
         columns[_label(channel, k)] = values
     period = _period(configuration, stamps, data)
-    return columns, {"sample_period_s": period}, _fewer(configuration.promised, stamps.size)
+    notes = (*_fewer(configuration.promised, stamps.size), *_skewed(configuration.channels, period))
+    return columns, {"sample_period_s": period}, notes
+
+
+def _skewed(channels: tuple[_Channel, ...], period: float) -> tuple[ReadingNote, ...]:
+    """A note where channels were sampled apart, each by so much behind its row's time."""
+    skews = {channel.name: channel.skew_us for channel in channels}
+    apart = max(skews.values()) - min(skews.values())
+    if apart < LEAST_SKEW * 1e6 * period:
+        return ()
+    said = ", ".join(f"{name} {skew:g} µs" for name, skew in skews.items() if skew)
+    return (ReadingNote("skew", f"channels were sampled up to {apart:g} µs apart ({said}): taken as of one time"),)
 
 
 def _fewer(promised: int, count: int) -> tuple[ReadingNote, ...]:
@@ -123,20 +139,21 @@ def _configuration(text: str, path: Path) -> _Configuration:
         stretches = [next(lines) for _ in range(max(rate_count, 1))]
         rates = [float(row[0]) for row in stretches]
         promised = int(float(stretches[-1][1])) if len(stretches[-1]) > 1 and stretches[-1][1] else 0
-        next(lines), next(lines)  # first sample, trigger
+        first, _ = next(lines), next(lines)  # first sample, trigger
+        stamp_s = 1e-9 if _NANOSECONDS.search(",".join(first)) else 1e-6
         data_type = next(lines)[0].upper()
         factor = float(next(lines, ["1"])[0] or 1)
         if len(set(rates)) > 1 or data_type not in (*_SAMPLES, "ASCII"):
             raise ValueError(f"rates of {rates[:5]} Hz, {data_type} data")
     except (ValueError, OverflowError, IndexError, StopIteration, csv.Error) as error:
         Stretch(memoryview(b""), path, _FORM).refuse(f"configuration: {str(error) or _cut_short(_rows_of(text))}")
-    return _Configuration(found, status, rates[0], promised, data_type, factor)
+    return _Configuration(found, status, rates[0], promised, data_type, stamp_s * factor)
 
 
 def _channel(row: list[str], line: int, promised: int) -> _Channel:
     """number, id, phase, component, unit, a, b, skew, min, max, primary, secondary, P|S; the last three since 1999."""
     try:
-        slope, offset = float(row[5]), float(row[6])
+        slope, offset, skew = float(row[5]), float(row[6]), float(row[7] or 0)
         primary, secondary = (float(row[k] or 1) for k in (10, 11)) if len(row) > 12 else (1.0, 1.0)
     except (ValueError, IndexError) as error:
         said = ",".join(row)[:40]
@@ -144,7 +161,7 @@ def _channel(row: list[str], line: int, promised: int) -> _Channel:
             f"line {line} ({said}) is no channel, where the second promises {promised} analogue ones"
         ) from error
     is_secondary = len(row) > 12 and row[12].upper() == "S" and secondary != 0
-    return _Channel(row[1], row[2], row[4], slope, offset, primary / secondary if is_secondary else 1.0)
+    return _Channel(row[1], row[2], row[4], slope, offset, primary / secondary if is_secondary else 1.0, skew)
 
 
 def _cut_short(lines: list[list[str]]) -> str:
@@ -199,11 +216,11 @@ def _ascii(data: Stretch, count: int) -> tuple[Signal, Signal]:
 
 
 def _period(configuration: _Configuration, stamps: Signal, data: Stretch) -> float:
-    steps = np.diff(stamps) * 1e-6 * configuration.time_factor
+    steps = np.diff(stamps) * configuration.stamp_s
     if configuration.rate_hz > 0:
         _require_agreement(configuration.rate_hz, steps, data.path)
         return 1.0 / configuration.rate_hz
-    if steps.size == 0 or not steps.min() > 0 or steps.max() - steps.min() > 1.5e-6 * configuration.time_factor:
+    if steps.size == 0 or not steps.min() > 0 or steps.max() - steps.min() > 1.5 * configuration.stamp_s:
         data.refuse("time stamps that are not at one rate")
     return float(steps.mean())
 

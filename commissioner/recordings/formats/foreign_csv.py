@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,11 @@ from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
 SAMPLED_ROWS = 200
+_STATISTIC = re.compile(
+    r"(?:mean|average|avg|mittelwert|mittel|moyenne|media|promedio|max(?:imum|imo|imal)?|min(?:imum|imo|imal)?|rms|std(?:dev)?|sum|summe)[.: ]*",
+    re.IGNORECASE,
+)
+"""What a row below the values is called that holds none of them."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,7 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     notes += without_torn_row(wrong_rows, body, width)
     columns = []
     filled = np.zeros(table.num_rows, dtype=np.int64)
+    below = np.zeros(table.num_rows, dtype=bool)
     for name, column in zip(layout.names, table.columns, strict=True):
         values, wrong = to_numbers(column, marks, source)
         filled += np.isfinite(values)
@@ -111,12 +118,17 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
         said = codes(cells)
         columns.append(values if said is None else said)
         notes += () if said is None else unknown(cells, said)
+        if said is None and meaning_of(name) != "time_s" and any(map(_STATISTIC.fullmatch, wrong)):
+            below |= [_STATISTIC.fullmatch(str(cell).strip()) is not None for cell in column.to_pylist()]
         if wrong and said is None and np.isfinite(values).any() and meaning_of(name) != "time_s":
             notes.append(
                 ReadingNote(
                     "no_number", f"{len(wrong)} cells of {name} are no number, as {wrong[0][:40]!r}: they were left out"
                 )
             )
+    if below.any() and not np.any((filled > 0) & ~below & (np.cumsum(below) > 0)):
+        filled[below] = 0
+        notes.append(ReadingNote("footer", f"{int(below.sum())} rows of statistics below the values were left out"))
     if wrong_rows:
         _require_footer(wrong_rows, rows, source)
         notes.append(ReadingNote("footer", f"{len(wrong_rows)} rows that are no row of the table were left out"))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,12 +22,21 @@ from commissioner.records import Signal
 MAX_DEPTH, MAX_FIELDS, MAX_MATRIX_COLUMNS = 8, 512, 64
 _HEADER, _HDF5 = 128, b"\x89HDF"
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
-_STRUCTURE, _TEXT, _NUMERIC, _COMPLEX = 2, 4, range(6, 16), 0x08
+_CELLS, _STRUCTURE, _OBJECT, _TEXT, _SPARSE, _NUMERIC, _COMPLEX = 1, 2, 3, 4, 5, range(6, 16), 0x08
+_PASSED_OVER = {_CELLS: "cells", _STRUCTURE: "an array of structures", _OBJECT: "an object", _SPARSE: "sparse"}
 _CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8"}
 LONGEST_TEXT = 1000
 _TYPES = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _PassedOver:
+    kind: str
+
+    def __str__(self) -> str:
+        return self.kind
 
 
 class _Bytes(Stretch):
@@ -66,8 +76,8 @@ def vectors(path: Path) -> dict[str, Signal]:
     return variables(path)[0]
 
 
-def variables(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
-    """(`vectors`, texts of one line), by their dotted paths. DataRefused: damaged, or too large."""
+def variables(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], dict[str, str]]:
+    """(`vectors`, texts of one line, what was passed over), by their dotted paths. DataRefused: damaged, or too large."""
     raw = bounded_bytes(path)
     order = {b"IM": "<", b"MI": ">"}.get(raw[_HEADER - 2 : _HEADER], "")
     file = _Bytes(memoryview(raw)[_HEADER:], order, path)
@@ -75,6 +85,7 @@ def variables(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
         file.refuse("another format, such as v7.3 (HDF5) or v4")
     found: dict[str, Signal] = {}
     texts: dict[str, float | str] = {}
+    left: dict[str, str] = {}
     limit, unpacked, numbers = unpacked_limit(path), 0, 0
     while not file.is_at_end:
         kind, content = file.element()
@@ -83,14 +94,14 @@ def variables(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
             unpacked += len(content.data)
             kind, content = content.element()
         for name, signal in _array(content, "", MAX_DEPTH) if kind == _MATRIX else ():
-            if isinstance(signal, str):
-                texts[name] = signal
+            if isinstance(signal, str | _PassedOver):
+                (texts if isinstance(signal, str) else left)[name] = str(signal)
                 continue
             found[name] = signal
             numbers += NUMBER_BYTES * signal.size
             if numbers > limit:
                 raise too_large(path, f"> {limit}", limit)
-    return found, texts
+    return found, texts, left
 
 
 def _unpacked(packed: _Bytes, left: int, limit: int) -> _Bytes:
@@ -104,7 +115,7 @@ def _unpacked(packed: _Bytes, left: int, limit: int) -> _Bytes:
     return _Bytes(memoryview(data), packed.order, packed.path)
 
 
-def _array(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal | str]]:
+def _array(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal | str | _PassedOver]]:
     """The vectors of one array element: itself, or its fields'."""
     if body.is_at_end:  # an empty field
         return
@@ -124,9 +135,11 @@ def _array(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal 
         if code in _CODES and len(content.data) <= LONGEST_TEXT:
             little = "-le" if body.order == "<" else "-be"
             yield full, bytes(content.data).decode(_CODES[code] + (little if code == 4 else ""), "replace")
+    elif is_complex or kind in _PASSED_OVER:
+        yield full, _PassedOver("complex" if is_complex else _PASSED_OVER[kind])
 
 
-def _fields(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal | str]]:
+def _fields(body: _Bytes, prefix: str, depth: int) -> Iterator[tuple[str, Signal | str | _PassedOver]]:
     widths = body.numbers(_INT32)
     width = int(widths[0]) if len(widths) == 1 else 0
     text = body.text()

@@ -6,6 +6,7 @@ DAQmx raw data, extended floats and other scalings are refused by name; texts an
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,7 +62,9 @@ def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
     size = 8 * sum(piece.size for channel in held.values() for piece in channel.pieces)
     if size > MAX_BYTES:
         raise too_large(path, size, MAX_BYTES)
-    values = {_name(key, channel): _scaled(channel, file) for key, channel in held.items()}
+    values = {
+        _name(key, channel): _scaled(channel, _above(key, channel, objects), file) for key, channel in held.items()
+    }
     return values, _metadata(objects, list(held.values()))
 
 
@@ -142,14 +145,23 @@ def _values(raw: Stretch, order: str, held: list[_Channel], is_interleaved: bool
         start = end
 
 
-def _scaled(channel: _Channel, file: Stretch) -> Signal:
-    """In the channel's unit, as its own scaling says."""
+def _above(key: str, channel: _Channel, objects: Mapping[str, _Channel]) -> Mapping[str, Property]:
+    """The properties that say how it is scaled: its own, else its group's, else the file's."""
+    group = objects.get(key[: key.rindex("/'")], _Channel()) if "/'" in key[1:] else _Channel()
+    all_of_them = (channel.properties, group.properties, objects.get("/", _Channel()).properties)
+    return next((p for p in all_of_them if "NI_Number_Of_Scales" in p), {})
+
+
+def _scaled(channel: _Channel, said: Mapping[str, Property], file: Stretch) -> Signal:
+    """In the channel's unit, as its scaling says; as it stands where that was applied before."""
     values = np.concatenate(channel.pieces).astype(np.float64)
-    scalings = channel.properties.get("NI_Number_Of_Scales")
+    if said.get("NI_Scaling_Status", "unscaled") != "unscaled":
+        return values
+    scalings = said.get("NI_Number_Of_Scales")
     for k in range(int(scalings) if isinstance(scalings, float) and 0 < scalings < 100 else 0):
-        kind = channel.properties.get(f"NI_Scale[{k}]_Scale_Type")
-        slope = channel.properties.get(f"NI_Scale[{k}]_Linear_Slope")
-        offset = channel.properties.get(f"NI_Scale[{k}]_Linear_Y_Intercept")
+        kind = said.get(f"NI_Scale[{k}]_Scale_Type")
+        slope = said.get(f"NI_Scale[{k}]_Linear_Slope")
+        offset = said.get(f"NI_Scale[{k}]_Linear_Y_Intercept")
         if kind is None:
             continue
         if kind != "Linear" or not isinstance(slope, float) or not isinstance(offset, float):
@@ -179,5 +191,6 @@ def _property(part: Stretch, order: str) -> Property:
 def _name(key: str, channel: _Channel) -> str:
     """`/'group'/'channel'` -> `group.channel [unit]`"""
     name = ".".join(part.strip("'").replace("''", "'") for part in key.strip("/").split("'/'"))
-    unit = channel.properties.get("unit_string")
+    units = (channel.properties.get(key) for key in ("unit_string", "NI_UnitDescription"))
+    unit = next((one for one in units if one), None)
     return f"{name} [{unit}]" if isinstance(unit, str) and unit else name

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import too_large, unpacked_limit
+from commissioner.recordings.reading.cells import is_number
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
@@ -87,8 +88,13 @@ def _require_bounded(path: Path) -> None:
 
 
 def _is_table(cells: Cells) -> bool:
-    numbers = (sum(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in row) for row in cells)
+    numbers = (sum(map(_is_number, row)) for row in cells)
     return sum(count >= LEAST_NUMBERS for count in numbers) >= LEAST_ROWS
+
+
+def _is_number(cell: object) -> bool:
+    """A number, or a text that is one."""
+    return is_number(cell) if isinstance(cell, str) else isinstance(cell, int | float) and not isinstance(cell, bool)
 
 
 def _shown(cell: object) -> str:

@@ -20,6 +20,9 @@ _COUNTERS = {"x", "n", "no", "nr", "index", "point", "points", "row", "sample", 
 TIME_MADE = "time_made"
 """Code of the note that the rows were counted by the interval which the file gives."""
 DAY_S = 86400.0
+DATES = ((32874.0, 73051.0), (7.2e5, 7.7e5))
+"""Days of the years 1990 to 2099 as Excel counts them, and of 1971 to 2108 as MATLAB does."""
+LEAST_STEP_S = 1e-6
 SAME_INTERVAL = 0.02
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
@@ -91,6 +94,18 @@ def through_midnight(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], 
         "midnight", f"the time of day passes midnight in {int(passed[-1])} places: 24 h were added behind each"
     )
     return {**columns, "time_s": time + DAY_S * passed}, [note]
+
+
+def from_days(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """A date counted in days, as a spreadsheet or MATLAB stores it, in seconds since midnight: stamps of our time whose steps would
+    be below a microsecond, which no recording of a motor has."""
+    time = columns.get("time_s")
+    if time is None or time.size < 2 or not any(low <= time[0] < high for low, high in DATES):
+        return dict(columns), []
+    if not 0.0 < (step := float(np.ptp(time)) / (time.size - 1)) < LEAST_STEP_S:
+        return dict(columns), []
+    note = ReadingNote("days", f"the time counts days, {step:.3g} a row: taken as {DAY_S * step:.6g} s a row")
+    return {**columns, "time_s": DAY_S * (time - np.floor(time[0]))}, [note]
 
 
 def with_running_time(
