@@ -195,7 +195,7 @@ def _along_the_circle(turned: Vector) -> float:
 
 def _without_harmonics(turned: Vector, angle_rad: Signal) -> Vector:
     """Without what repeats with the supply."""
-    rest = turned - turned.mean()
+    rest: Vector = turned - turned.mean()
     step = np.exp(2j * angle_rad)
     turn = np.ones_like(step)
     for _ in range(HARMONICS):
