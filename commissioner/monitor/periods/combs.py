@@ -86,11 +86,7 @@ def _find_shaft(
     table = tuple((f, score) for f, score, _ in candidates)
     low, high = periods.range_hz(search)
     for frequency, _, visible in candidates:
-        seen = tuple(
-            h
-            for h in visible
-            if _is_peak(spectrum, h * frequency) and not _on_mains_skirt(h * frequency, search.supply_hz)
-        )
+        seen = tuple(h for h in visible if _is_own_line(spectrum, h * frequency, 2 * search.supply_hz, frequency))
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
         if powers.max() <= periods.SHAFT_SIGNIFICANT and powers.sum() <= 2 * periods.SHAFT_SIGNIFICANT:
             break
@@ -103,15 +99,19 @@ def _find_shaft(
     return None, table
 
 
+def _is_own_line(spectrum: PairSpectrum, line_hz: float, mains_hz: float, shaft_hz: float) -> bool:
+    """Neither another line's skirt nor what the mains and a slower load make."""
+    return (
+        _is_peak(spectrum, line_hz)
+        and not periods.on_mains_skirt(line_hz, mains_hz, spectrum.cell_hz)
+        and not periods.is_mains_side_band(spectrum, line_hz, mains_hz, shaft_hz / periods.MOST_TURNS)
+    )
+
+
 def _is_peak(spectrum: PairSpectrum, frequency_hz: float) -> bool:
     """False on the skirt of a stronger line within three cells: the shaft then turns outside the slip that was allowed."""
     place = np.array([frequency_hz])
     return bool(spectrum.at(place, 0.6)[0] > 0.3 * spectrum.at(place, 3.0)[0])
-
-
-def _on_mains_skirt(frequency_hz: float, supply_hz: float) -> bool:
-    """Near an even mains line (unbalance, harmonics), which is far stronger than any load's and wanders in size."""
-    return abs(frequency_hz - 2 * supply_hz * round(frequency_hz / (2 * supply_hz))) < periods.NEAR_MAINS_HZ
 
 
 def _refined(

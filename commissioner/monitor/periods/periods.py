@@ -248,10 +248,23 @@ def _is_multiple(frequency_hz: float, fundamental_hz: float, tolerance_hz: float
     return bool(abs(frequency_hz - order * fundamental_hz) < 1.5 * tolerance_hz)
 
 
-NEAR_MAINS_HZ = 0.7
-"""Mains harmonics wander in size and phase: their skirts are not loads."""
+NEAR_MAINS_HZ, NEAR_MAINS_CELLS = 0.7, 6.0
+"""Mains harmonics wander in size and phase: their skirts are not loads, nor are the lobes that the window gives them."""
 NEAR_COMB_HZ = 0.3
 """Nor are the skirts of a comb whose load varies."""
+
+
+def on_mains_skirt(frequency_hz: float, mains_hz: float, cell_hz: float) -> bool:
+    """Beside a multiple of `mains_hz`, whose line is far stronger than any load's."""
+    beside = abs(frequency_hz - mains_hz * round(frequency_hz / mains_hz))
+    return bool(beside < max(NEAR_MAINS_HZ, NEAR_MAINS_CELLS * cell_hz))
+
+
+def is_mains_side_band(spectrum: PairSpectrum, frequency_hz: float, mains_hz: float, below_hz: float) -> bool:
+    """As far from a multiple of `mains_hz` as a stronger line below `below_hz` is from zero: that load swings the mains' line as well."""
+    beside = abs(frequency_hz - mains_hz * round(frequency_hz / mains_hz))
+    own, load = (float(spectrum.at(f, LOBE_CELLS)[0]) for f in (frequency_hz, beside))
+    return beside < below_hz and load > max(own, SIGNIFICANT)
 
 
 def _distance(frequency_hz: float, fundamental_hz: float) -> float:
@@ -260,8 +273,7 @@ def _distance(frequency_hz: float, fundamental_hz: float) -> float:
 
 def is_product(frequency_hz: float, combs_hz: list[float], supply_hz: float, tolerance_hz: float) -> bool:
     """True where the line is a sum or difference of known combs and even mains harmonics: mixing, not a load."""
-    nearest = np.abs(frequency_hz - supply_hz * np.round(frequency_hz / supply_hz))
-    if frequency_hz > 0.5 * supply_hz and nearest < max(NEAR_MAINS_HZ, 6 * tolerance_hz):
+    if frequency_hz > 0.5 * supply_hz and on_mains_skirt(frequency_hz, supply_hz, tolerance_hz):
         return True
     if any(_distance(frequency_hz, f) < max(NEAR_COMB_HZ, 4 * tolerance_hz) for f in combs_hz):
         return True

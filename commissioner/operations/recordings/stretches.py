@@ -73,14 +73,15 @@ def in_its_states(
 def _wired_alike(
     parts: dict[Stretch, RunningRecording], plate: Nameplate, wishes: Wishes
 ) -> dict[Stretch, Observation | Refused]:
-    """What each stretch says. Where one alone leaves open whether it generates or is crossed, the wiring is that of the others: of those
-    that read, as they are named, as a motor in no second way."""
+    """What each stretch says. Where one alone leaves open whether it generates or is crossed, however short it is, the wiring is that of
+    the others: of those that read, as they are named, as a motor in no second way."""
     watched = {stretch: _watched(part, plate, wishes) for stretch, part in parts.items()}
     told = {seen.audited.wired for seen in watched.values() if is_straight_motor(seen.audited)}
     if len(told) == 1:
         known = replace(wishes, wired=told.pop())
         for stretch, seen in watched.items():
-            if isinstance(seen, Refused) and seen.reason.code == "generating_or_crossed":
+            generator = seen.audited.generator
+            if generator is not None and generator.is_named:
                 watched[stretch] = _watched(parts[stretch], plate, known)
     return watched
 

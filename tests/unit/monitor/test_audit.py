@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.chain import Refused, Wishes, observe
-from commissioner.monitor.intake.audit import inspect
-from commissioner.monitor.intake.clock import whole_stretch
+from commissioner.monitor.intake.audit import inspect, measure_fundamental
+from commissioner.monitor.intake.clock import hidden_jitter, whole_stretch
 from commissioner.monitor.intake.findings import Findings
 from commissioner.monitor.intake.levels import clipped_share
+from commissioner.monitor.signals.supply import follow_supply
 from commissioner.motor.running import from_nameplate
 from commissioner.operations.recordings.stretches import in_its_states
 from commissioner.records import RunningRecording
@@ -183,6 +184,22 @@ def test_jitter_behind_regular_stamps_is_measured() -> None:
     note = next(f for f in found.findings if f.code == "clock_jitter")
     assert note.kind == "note"
     assert note.value == pytest.approx(0.2, abs=0.05)  # 25 us of 125 us
+
+
+@pytest.mark.parametrize(("jitter", "said"), [(0.0, 0.0), (0.2, 0.2)])
+def test_harmonics_of_the_mains_are_no_jitter(jitter, said):
+    """A fifth and a seventh that turn the vector together, at 35 samples a period."""
+    period, noise = 1 / 2100, np.random.default_rng(3)
+    t = np.arange(12000) * period
+    at = 120 * np.pi * (t + jitter * period * noise.standard_normal(t.size))
+    v = 300.0 * (np.exp(1j * at) + 0.05 * np.exp(-5j * at) - 0.05 * np.exp(7j * at)) + noise.standard_normal(
+        (2, t.size)
+    ).T @ [0.5, 0.5j]
+    supply = follow_supply(v, period, 60.0)
+    fundamental = measure_fundamental(v, v, supply, period, backwards=False)
+    findings = Findings()
+    hidden_jitter(v, supply, fundamental, period, findings)
+    assert sum(f.value for f in findings) == pytest.approx(said, rel=0.1)
 
 
 def test_too_short_a_recording_is_refused_but_its_fundamental_is_reported() -> None:

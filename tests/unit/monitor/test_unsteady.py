@@ -1,5 +1,6 @@
 """Loads that step, build up, drift and swing, and supplies that ramp slowly or step; truth from phasors and closed forms."""
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -173,3 +174,32 @@ def test_no_line_of_rectangular_pulses_stands_out_of_its_comb(duty):
     assert len(lines) >= 5 and not any(stands_out(spectrum, f) for f in lines)
     turning = spectrum_of(train + 0.1 * np.exp(2j * np.pi * 22.97 * t))
     assert stands_out(turning, 22.97)
+
+
+@pytest.mark.parametrize("swings_hz", [0.4, 0.7])
+def test_the_skirt_of_the_mains_is_no_shaft(swings_hz):
+    """An unbalance that swings has lobes about 100 Hz: the fourth line of a shaft of four poles with little slip lies there as well."""
+    steady = recorded(lambda t: 0.02 + 0 * t, seconds=3.5)
+    t = steady.time_s
+    swaying = (1.0 + 0.3 * np.sin(2 * np.pi * swings_hz * t)) * np.exp(-100j * np.pi * t)
+    currents = tuple(i + (swaying * np.exp(-2j * np.pi * k / 3)).real for k, i in enumerate(steady.currents_a))
+    seen, _, stretches = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == "no_period"
+    speed = said_by_terminals(seen, stretches, PLATE).speed_rad_per_s
+    assert abs(speed.value - 50 * np.pi * 0.98) < 1.96 * speed.std
+
+
+@pytest.mark.parametrize("ahead", [-0.15, 0.1])
+def test_what_a_swinging_load_makes_of_the_mains_is_no_line_of_the_shaft(ahead):
+    """The shaft's second line stood within a cell of 100 Hz less the swing: the speed was 25 standard deviations off."""
+    slip, swing_hz = 0.0325, 3.3
+    steady = recorded(lambda t: slip + 0.01 * np.sin(2 * np.pi * swing_hz * t), seconds=10.0)
+    t, turned = steady.time_s, 100 * np.pi * steady.time_s
+    shaft = (100.0 - swing_hz + ahead) / 4.0
+    lines = 0.012 * np.cos(2 * np.pi * shaft * t) + 0.06 * np.sin(2 * np.pi * swing_hz * t) * np.exp(-2j * turned)
+    currents = tuple(
+        i + (8.0 * lines * np.exp(1j * (turned - 2 * np.pi * k / 3))).real for k, i in enumerate(steady.currents_a)
+    )
+    seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
+    assert not isinstance(seen, Refused)
+    assert abs(seen.mean_speed_rad_per_s - 2 * np.pi * shaft) < 3.0 * seen.mean_speed_std
