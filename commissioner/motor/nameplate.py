@@ -215,11 +215,15 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
         )
 
 
+BETWEEN_LINES = (math.sqrt(3.0), 2.0)
+"""Between two readings of one plate: 230/400 V, star or delta, and 230/460 V, halves of a winding in parallel or in series."""
+
+
 def _of_two_lines(plate: Nameplate, efficiency: float) -> str:
     """The two readings that would fit where voltage and current are of different connections."""
-    is_low = efficiency < typical_efficiency(plate.rated_power_w)
-    up = math.sqrt(3.0) if is_low else 1.0 / math.sqrt(3.0)
-    if not LEAST_OF_TYPICAL < up * efficiency / typical_efficiency(plate.rated_power_w) < 1.25:
+    off = efficiency / typical_efficiency(plate.rated_power_w)
+    up = min((k if off < 1.0 else 1.0 / k for k in BETWEEN_LINES), key=lambda k: abs(math.log(k * off)))
+    if not LEAST_OF_TYPICAL < up * off < 1.25:
         return ""
     return (
         f": {plate.rated_voltage_v:.4g} V with {plate.rated_current_a / up:.3g} A would fit, or "

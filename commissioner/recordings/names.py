@@ -143,8 +143,8 @@ _PARAMETER = re.compile(r"^[rp]\d{2,5}(?:\[\d+\])?[:\s]+")
 """Of a drive's trace: `r0069[0] Phase current actual value, Phase U`."""
 _TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
 _RYB_AS_RST = str.maketrans("yb", "st")
-_STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)")
-"""`isa`, `usb`; `ias`, `vbs`: stator quantities."""
+_STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)|([uv])s([abcuvw123]{2})")
+"""`isa`, `usb`; `ias`, `vbs`; `usab`: stator quantities."""
 _NEUTRAL = re.compile(r"(?:[iuv]|current|voltage|strom|spannung|courant|tension)(?:n|neutral)")
 """Of the neutral: no phase, whatever letters its unit adds."""
 _KIND = rf"(?:{CURRENT}|{VOLTAGE})"
@@ -291,7 +291,7 @@ def _meaning(bare: str, with_s: bool) -> str | None:
     if at_rest := WHOLE_NAMES.get(key) or _at_rest({word for word in words if word not in BESIDE}):
         return at_rest
     if stator := _STATOR.fullmatch(key):
-        return _column(stator[1], stator[2] or stator[3])
+        return _column(stator[1] or stator[4], stator[2] or stator[3] or stator[5])
     words = [word for word in words if word not in FILLING]
     kinds = [word for word in words if re.fullmatch(rf"{CURRENT}|{VOLTAGE}", word)]
     kind = max(kinds, key=len, default="")

@@ -24,6 +24,8 @@ DRIFT_DEGREE = 4
 clock), only as far as its coefficients stand out. Where it does, the frequency that captures most is not the mean one."""
 DRIFT_KNOWN = 0.1
 """Relative error of the drift's mean: coefficients below three deviations were dropped."""
+MOST_AGAIN, STILL = 3, 0.3
+"""How often lines are told apart anew, and the share of their standard errors within which their frequencies then stay."""
 OUTSIDE_SIGMA = 4.0
 """Of a line's frequency, from which it lies beyond the slip that the power allows."""
 
@@ -56,9 +58,15 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
         if new is None:
             break
         known.append(new)
-    if len(known) > 1:
+    for _ in range(MOST_AGAIN if known else 0):
+        before = known
         rest, own = told_apart(frame, part, known)
         known = [_again(frame, part, rest + mine, spectrum, one) for one, mine in zip(known, own, strict=True)]
+        if all(
+            abs(n.frequency_hz - o.frequency_hz) < STILL * n.frequency_std_hz
+            for n, o in zip(known, before, strict=True)
+        ):
+            break
     return Found(shaft and known[0], tuple(known[1:] if shaft else known), spectrum, left, candidates)
 
 
@@ -72,7 +80,8 @@ def told_apart(frame: TurningFrame, part: slice, known: list[Periodicity]) -> tu
 
 
 def _again(frame: TurningFrame, part: slice, alone: Vector, spectrum: PairSpectrum, one: Periodicity) -> Periodicity:
-    """Refined once more without the others: a line of theirs a tenth of a hertz beside would turn the phase that is followed."""
+    """Refined once more without the others and the mains: a line of theirs some tenths of a hertz beside would turn the phase that
+    is followed, as an offset does beside a two-pole motor's shaft, and took some of it while the comb was not known."""
     found = _refined(frame, part, alone, spectrum, one.name, one.frequency_hz, one.harmonics_seen)
     return found if one.name == "shaft" else replace(found, name=f"load {found.frequency_hz:.4g} Hz")
 

@@ -18,16 +18,16 @@ from commissioner.records import StandstillRecording
 PLATE = Nameplate(2200.0, 400.0, 50.0, 4.9, 1436.0, 0.80, 2, "star")
 TRUTH = (3.7, 2.122, 0.020934, 0.22477)
 T = 250e-6
+TONES = ((1.3, 9.0), (3.7, 12.0), (11.0, 25.0), (37.0, 45.0), (83.0, 60.0))
 
 
-def recording(lag, seconds=1.6, noise_a=0.01, seed=1):
+def recording(lag, seconds=1.6, noise_a=0.01, seed=1, truth=TRUTH, tones=TONES):
     """The exact answer of the linear machine to a held multitone voltage, read `lag` periods late."""
-    r_s, r_r, leak, main = TRUTH
+    r_s, r_r, leak, main = truth
     a = np.array([[-(r_s + r_r) / leak, r_r / main / leak], [r_r, -r_r / main]])
     b = np.array([1.0 / leak, 0.0])
     n = round(seconds / T)
     t = np.arange(n) * T
-    tones = ((1.3, 9.0), (3.7, 12.0), (11.0, 25.0), (37.0, 45.0), (83.0, 60.0))
     u = sum(amp * np.sin(2 * np.pi * f * t + k) for k, (f, amp) in enumerate(tones)) * np.minimum(t / 0.05, 1.0)
 
     def held(h):
@@ -77,6 +77,26 @@ def test_sound_currents_have_none_within_its_error():
         value, std = seen.delay_s
         assert abs(value) < 4.0 * std and 0.0 < std / T < 0.01
         assert not any("behind the voltage" in remark for remark in seen.remarks)
+
+
+LARGE = Nameplate(75_000.0, 400.0, 50.0, 134.0, 1484.0, 0.86, 2, "star")
+OF_LARGE = (0.0240, 0.0178, 0.00085, 0.0135)
+FAST_TONES = ((1.3, 2.0), (9.0, 4.0), (83.0, 25.0), (331.0, 60.0))
+"""Of a motor whose resistance turns them by 2 to 3 degrees, two rows late by 15 and 60."""
+
+
+def test_currents_of_a_large_motor_are_late_and_take_power():
+    lag = 2.05
+    seen = identify(recording(lag, noise_a=0.1, truth=OF_LARGE, tones=FAST_TONES), LARGE)
+    assert seen.delay_s[0] / T == pytest.approx(lag, abs=0.005)
+    for found, error, true in zip(seen.parameters.as_tuple(), seen.std, OF_LARGE, strict=True):
+        assert found == pytest.approx(true, abs=max(3.5 * error, 1.5e-3 * true))
+
+
+def test_a_large_motor_that_gives_power_out_is_refused():
+    one = recording(2.05, noise_a=0.1, truth=OF_LARGE, tones=FAST_TONES)
+    with pytest.raises(DataRefused, match="does not follow the voltage"):
+        identify(replace(one, current_u_a=-one.current_u_a, current_v_a=-one.current_v_a), LARGE)
 
 
 @pytest.mark.parametrize("lag", [-4.2, 3.6])

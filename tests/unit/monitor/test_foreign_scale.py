@@ -110,7 +110,7 @@ def test_the_factor_of_a_lightly_loaded_motor_is_that_of_its_currents(order: tup
     doubled = rewired(replace(recording, currents_a=tuple(2.0 * x for x in recording.currents_a)), order)
     seen = observe(doubled, plate)
     assert isinstance(seen, Refused) and seen.reason.code == "plate_contradiction"
-    assert "2.01 times in the geometric mean (a probe, a turns or a terminal factor?)" in seen.reason.what
+    assert "2.02 times in the geometric mean (a probe, a turns or a terminal factor?)" in seen.reason.what
     assert ("crossed_channels" in {f.code for f in seen.findings}) == is_crossed
 
 

@@ -142,6 +142,13 @@ def test_nothing_is_steady_while_the_order_of_the_phases_is_reversed():
     assert [s[0] for s in runs_of(reversal)] == ["steady", "ramp", "steady"]
 
 
+def test_a_switching_off_is_no_ramp_of_the_coasting_machines_frequency():
+    """A window over it has current yet, and the frequency of a shaft that a large load stops within a tenth of a second."""
+    off = levels(current_a=(3.0, 4.0, 0.0), voltage_v=(3.0, 4.0, 60.0), frequency_hz=(2.94, 4.0, 40.0))
+    steady, coasting = runs_of(named(off, PLATE))
+    assert (steady[0], coasting[0]) == ("steady", "coast-down") and steady[2] == pytest.approx(3.0, abs=0.1)
+
+
 def test_the_plateau_of_a_long_start_is_never_steady():
     """Seconds of five times the rated current, at its end still or not."""
     never = levels(current_a=(0.0, 4.0, 5.2 * PLATE.rated_current_a))

@@ -79,6 +79,22 @@ def test_a_small_motors_delta_voltage_beside_its_star_current_is_refused_with_th
     assert "(it is 0.996): 230 V with 0.727 A would fit, or 398.4 V with 0.42 A" in problem.expected
 
 
+@pytest.mark.parametrize(
+    ("volts", "amperes", "readings"),
+    [
+        (460.0, 38.0, "460 V with 19 A would fit, or 230 V with 38 A"),
+        (230.0, 19.0, "230 V with 38 A would fit, or 460 V with 19 A"),
+    ],
+)
+def test_the_low_voltages_current_beside_the_high_voltage_of_a_230_460_v_plate_is_refused_with_the_two(
+    volts, amperes, readings
+):
+    """NEMA MG 1, 15 hp, 4 poles: 230/460 V, 38/19 A, 1765 1/min, efficiency 0.91."""
+    plate = Nameplate(11190.0, volts, 60.0, amperes, 1765.0, 0.81, 2, "star")
+    (problem,) = check(plate)
+    assert readings in problem.expected
+
+
 def test_the_electrical_input_given_as_the_power_is_refused():
     (problem,) = check(dataclasses.replace(PLATE, rated_power_w=2626.0, rated_current_a=4.86, power_factor=0.78))
     assert "the one at the shaft" in problem.expected

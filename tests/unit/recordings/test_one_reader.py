@@ -357,3 +357,11 @@ def test_a_file_of_circuit_values_alone_is_told_what_it_lacks(tmp_path):
     with pytest.raises(DataRefused, match="no measurement is in this file") as refused:
         to_standstill(contract_table(path))
     assert "docs formats" in refused.value.remedy
+
+
+def test_line_voltages_of_the_stator_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    path.write_text(lines("t,isa,isb,usab,usbc") + rows(TIME, [*CURRENTS[:2], UV, VW]))
+    recording = read_running(path)
+    assert recording.voltages_are_line_to_line
+    np.testing.assert_allclose(recording.voltages_v[0], UV, atol=1e-3)

@@ -70,7 +70,8 @@ def _name_ramps(levels: Levels, idle: np.ndarray, names: list[str]) -> None:
     before, behind = (np.clip(np.arange(last + 1) + k, 0, last) for k in (-half, half))
     share = FAST_CHANGE * (behind - before) / (2 * half)
     is_ramp = _moved(hertz, before, behind, share) | (levels.sense[before] != levels.sense[behind])
-    is_near_idle = maximum_filter1d(idle, 2 * half + 1, mode="nearest")
+    # a window over the switching off has the coasting machine's frequency in it, and current yet
+    is_near_idle = maximum_filter1d(idle, 2 * (half + HOPS) + 1, mode="nearest")
     is_ramp &= ~is_near_idle
     if levels.vector_a is not None:
         is_ramp |= _slow_ramps(levels, maximum_filter1d(is_near_idle, 2 * half + 1, mode="nearest"), half)
