@@ -9,6 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from commissioner.motor.quantities import FIVE
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import NBSP, UNITS, check_name, spoken
 from commissioner.service.page.texts import Texts
@@ -41,14 +42,16 @@ class Quantity:
     limit: str
 
 
-QUANTITIES = (
-    Quantity("stator_resistance_ohm", "R<sub>s</sub>", "stator resistance", 1.0, "Ω", 3, "resistance_std_percent"),
-    Quantity("rotor_resistance_ohm", "R<sub>R</sub>", "rotor resistance", 1.0, "Ω", 3, "rotor_resistance_std_percent"),
-    Quantity("leakage_inductance_h", "L<sub>σ</sub>", "leakage inductance", 1e3, "mH", 3, "leakage_std_percent"),
-    Quantity(
-        "magnetizing_inductance_h", "L<sub>M</sub>", "magnetizing inductance", 1e3, "mH", 1, "magnetizing_std_percent"
-    ),
-    Quantity("rotor_time_constant_s", "T<sub>R</sub>", "rotor time constant", 1e3, "ms", 1, ""),
+_ON_THE_PAGE = (
+    ("R<sub>s</sub>", 3, "resistance_std_percent"),
+    ("R<sub>R</sub>", 3, "rotor_resistance_std_percent"),
+    ("L<sub>σ</sub>", 3, "leakage_std_percent"),
+    ("L<sub>M</sub>", 1, "magnetizing_std_percent"),
+    ("T<sub>R</sub>", 1, ""),
+)
+QUANTITIES = tuple(
+    Quantity(of.field, symbol, of.words, of.factor, of.unit, digits, limit)
+    for of, (symbol, digits, limit) in zip(FIVE, _ON_THE_PAGE, strict=True)
 )
 
 
