@@ -59,7 +59,7 @@ def noise_spectrum(residuals: Sequence[Signal], period_s: float) -> tuple[float,
     Weighted least squares over medians of bands (relative variance of a median of K exponential ordinates: 1 / (K ln^2 2)).
     """
     frequency, power = (np.concatenate(each) for each in zip(*(_bands(r, period_s) for r in residuals), strict=True))
-    if len(power) < FEWEST_BANDS or not np.any(power > 0.0):
+    if len(power) < FEWEST_BANDS or not np.all(power > 0.0):
         return 0.0, 0.0
     middle = 1.0 / np.mean(1.0 / frequency, axis=1)
     rows = np.column_stack([np.ones(middle.size), 1.0 / middle])

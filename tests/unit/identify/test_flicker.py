@@ -33,9 +33,10 @@ def test_the_density_is_found_and_a_white_noise_has_none():
     assert min(found) > 0.0
 
 
-def test_two_short_stretches_are_judged_together_and_a_moment_says_nothing():
+def test_two_short_stretches_are_judged_together_and_a_moment_or_silence_says_nothing():
     assert noise_spectrum([noise(1, 5_000, CORNER_HZ), noise(2, 5_000, CORNER_HZ)], PERIOD_S)[1] > 0.0
     assert noise_spectrum([noise(1, 100, CORNER_HZ), noise(2, 1, CORNER_HZ)], PERIOD_S)[1] == 0.0
+    assert noise_spectrum([noise(1, 10_000, CORNER_HZ), np.zeros(10_000)], PERIOD_S) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("kept", [MOST_KEPT, 80_000], ids=["whole", "too long to keep"])
