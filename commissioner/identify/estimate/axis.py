@@ -13,8 +13,8 @@ from commissioner.compiled import writable
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
-from commissioner.identify.batch.flicker import widened
 from commissioner.identify.batch.segments import BatchFit, Segment
+from commissioner.identify.batch.slow_noise import widened
 from commissioner.identify.batch.starts import from_impedance
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
 from commissioner.identify.estimate.sufficiency import require_conditioned

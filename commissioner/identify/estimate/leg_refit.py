@@ -17,9 +17,9 @@ from scipy.special import chdtrc
 
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.fit import fit_segments
-from commissioner.identify.batch.flicker import widened
 from commissioner.identify.batch.model import Matrix
 from commissioner.identify.batch.segments import BatchFit, Segment
+from commissioner.identify.batch.slow_noise import widened
 from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.leg_pair import PairLaw

@@ -1,4 +1,5 @@
-"""Sensor noise that rises towards low frequencies as 1/f: how much of it a fit leaves unexplained, and what it costs its estimates.
+"""Noise that is larger at low frequencies, of sensors and of what drifts: how much of it a fit leaves unexplained, and what it costs
+its estimates.
 
 The fit's own sandwich takes stretches of a quarter of a second, too short to show it; and at the lowest tones the fit takes a part
 of it away, so that its level comes from between them.
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,27 +26,56 @@ SLOW_HZ = 45.0
 CERTAIN = 7.0
 """Standard errors that a white noise would give it: it reaches as many in two of a thousand recordings of four seconds."""
 PASSES = 8
+PLATEAUS_HZ = (0.0, 0.5, 1.5, 5.0, 15.0)
+"""Below which a noise that falls with the square of frequency (a first-order lag of a white one; 0: a random walk) rises no more."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """1 / f, or 1 / (f^2 + plateau^2) where there is a `plateau_hz`."""
+
+    plateau_hz: float | None
+
+    def __call__(self, frequency_hz: Signal) -> Signal:
+        if self.plateau_hz is None:
+            return 1.0 / frequency_hz
+        return 1.0 / (np.square(frequency_hz) + self.plateau_hz**2)
+
+
+SHAPES = (Shape(None), *map(Shape, PLATEAUS_HZ))
+
+
+@dataclass(frozen=True)
+class SlowNoise:
+    """Periodogram |R(f)|^2 / n = `white` + sum of `slow` times shapes, in A^2: of `SHAPES` the mean, by how well each describes it."""
+
+    white: float
+    slow: tuple[float, ...]
+
+    def above_white(self, frequency_hz: Signal) -> Signal:
+        """In A^2 at these frequencies."""
+        return np.asarray(sum(size * shape(frequency_hz) for size, shape in zip(self.slow, SHAPES, strict=True)))
 
 
 def widened(fit: BatchFit, segments: Sequence[Segment]) -> BatchFit:
     """The fit with what such a noise adds to its covariance (sandwich with the noise's spectrum; E. J. Hannan, Journal of Applied
     Probability 8, 1971, 767); itself where there is none."""
-    white, slow = noise_spectrum(fit.residuals, fit.sample_period_s)
-    if slow == 0.0:
+    noise = slow_noise(fit.residuals, fit.sample_period_s)
+    if noise is None:
         return fit
     problem = Problem(segments, fit.sample_period_s, fit.model)
     problem.expect_leg(fit.theta)
     information, sensitivities = problem.sensitivities(fit.theta, fit.own)
     scores = np.zeros_like(information)
     for columns, rows in sensitivities:
-        scores[np.ix_(columns, columns)] += _over_frequency(rows, fit.sample_period_s)
+        scores[np.ix_(columns, columns)] += _shaped(rows, fit.sample_period_s, noise)
     shared = np.flatnonzero(fit.model.free_shared)
     free = np.flatnonzero(problem.free)
     scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
     normal, scattered = (each[np.ix_(free, free)] / np.outer(scale, scale) for each in (information, scores))
     inverse = np.linalg.pinv(normal, rcond=1e-14)
     kept = sum(len(rows) for _, rows in sensitivities) / sum(x.current_a.size for x in segments)
-    by_spectrum = kept * inverse @ (white * normal + slow * scattered) @ inverse / np.outer(scale, scale)
+    by_spectrum = kept * inverse @ (noise.white * normal + scattered) @ inverse / np.outer(scale, scale)
     by_spectrum = by_spectrum[: shared.size, : shared.size]
     more = np.sqrt(np.maximum(np.diag(fit.covariance)[shared] / np.diag(by_spectrum), 1.0))
     covariance = np.zeros_like(fit.covariance)
@@ -53,26 +83,34 @@ def widened(fit: BatchFit, segments: Sequence[Segment]) -> BatchFit:
     return replace(fit, covariance=covariance)
 
 
-def noise_spectrum(residuals: Sequence[Signal], period_s: float) -> tuple[float, float]:
-    """a in A^2 and c in A^2 Hz of the periodogram |R(f)|^2 / n = a + c / f; c is 0.0 where it is not beyond doubt.
-
-    Weighted least squares over medians of bands (relative variance of a median of K exponential ordinates: 1 / (K ln^2 2)).
-    """
+def slow_noise(residuals: Sequence[Signal], period_s: float) -> SlowNoise | None:
+    """What describes the medians of bands; None where no slow noise is beyond doubt."""
     frequency, power = (np.concatenate(each) for each in zip(*(_bands(r, period_s) for r in residuals), strict=True))
     if len(power) < FEWEST_BANDS or not np.all(power > 0.0):
-        return 0.0, 0.0
-    middle = 1.0 / np.mean(1.0 / frequency, axis=1)
-    rows = np.column_stack([np.ones(middle.size), 1.0 / middle])
+        return None
+    levels, misfits = map(np.array, zip(*(_fitted(shape(frequency), power) for shape in SHAPES), strict=True))
+    if not np.isfinite(misfits).any():
+        return None
+    share = np.exp(-0.5 * (misfits - misfits.min()))
+    share /= share.sum()
+    return SlowNoise(float(share @ levels[:, 0]), tuple(share * levels[:, 1]))
+
+
+def _fitted(shape: Matrix, power: Matrix) -> tuple[Signal, float]:
+    """((white, slow), chi-square) by weighted least squares over (bands, BAND) ordinates' medians; infinite where the slow one is not
+    beyond doubt. Relative variance of a median of K exponential ordinates: 1 / (K ln^2 2)."""
+    rows = np.column_stack([np.ones(len(power)), np.median(shape, axis=1)])
+    ordinates = BAND * math.log(2.0) ** 2
     level = np.array([np.median(power) / math.log(2.0), 0.0])
+    ratio = np.ones(len(power))
     for _ in range(PASSES):
-        expected = rows @ level
-        ratio = np.median(power / (level[0] + level[1] / frequency), axis=1) / math.log(2.0)
-        weighted = rows / expected[:, None]
-        information = weighted.T @ weighted
-        level = np.linalg.solve(information, weighted.T @ ratio)
+        ratio = np.median(power / (level[0] + level[1] * shape), axis=1) / math.log(2.0)
+        weighted = rows / (rows @ level)[:, None]
+        level = np.linalg.solve(weighted.T @ weighted, weighted.T @ ratio)
         level = np.array([max(level[0], 1e-3 * float(np.median(power))), max(level[1], 0.0)])
-    of_white = math.sqrt(np.linalg.inv(rows.T @ rows)[1, 1] / BAND) * level[0] / math.log(2.0)
-    return float(level[0]), float(level[1]) if level[1] > CERTAIN * of_white else 0.0
+    of_white = level[0] * math.sqrt(np.linalg.inv(rows.T @ rows)[1, 1] / ordinates)
+    is_beyond_doubt = level[1] > CERTAIN * of_white
+    return level, 2.0 * ordinates * float(np.sum(ratio - 1.0 - np.log(ratio))) if is_beyond_doubt else math.inf
 
 
 def _bands(residual: Signal, period_s: float) -> tuple[Signal, Signal]:
@@ -84,11 +122,11 @@ def _bands(residual: Signal, period_s: float) -> tuple[Signal, Signal]:
     return frequency.reshape(count, BAND), power.reshape(count, BAND)
 
 
-def _over_frequency(signals: Matrix, period_s: float) -> Matrix:
-    """Sum over frequencies of X X^H / f, X the (n, p) signals' spectrum: (p, p), without what has no frequency."""
+def _shaped(signals: Matrix, period_s: float, noise: SlowNoise) -> Matrix:
+    """Sum over frequencies of X X^H / n times the noise above white, X the (n, p) signals' spectrum: (p, p), without what has no frequency."""
     size = len(signals)
     spectrum = np.fft.rfft(signals, axis=0)[1:]
     both_sides = np.full(len(spectrum), 2.0)
     both_sides[(size - 1) // 2 :] = 1.0  # half the sampling frequency stands once
-    weight = both_sides * period_s / np.arange(1, len(spectrum) + 1)
+    weight = both_sides / size * noise.above_white(np.arange(1, len(spectrum) + 1) / (size * period_s))
     return np.real((spectrum.conj().T * weight) @ spectrum)
