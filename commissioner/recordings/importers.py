@@ -28,6 +28,7 @@ from commissioner.recordings.reading.mend import (
     TIME_MADE,
     against_interval,
     from_days,
+    require_one_block,
     require_seconds,
     require_stamps,
     through_midnight,
@@ -56,7 +57,7 @@ from commissioner.records import ReadingNote, RunningRecording, Signal
 
 _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]]] = {
     ".mat": structures.channels,
-    ".tdms": lambda path: (*tdms.channels(path), ()),
+    ".tdms": tdms.channels,
     ".mf4": lambda path: (mdf4.channels(path), {}, ()),
     ".cfg": comtrade.channels,
     ".dat": comtrade.channels,
@@ -145,7 +146,7 @@ def _another_way(path: Path, mapping: ChannelMap, refusal: DataRefused) -> Table
     try:
         return _of_text(path, mapping)
     except DataRefused as second:
-        raise (second if second.step in {"read numbers", "recognise columns"} else refusal) from None
+        raise (second if second.step in {"read numbers", "recognise columns", "read the time"} else refusal) from None
 
 
 def _head(path: Path) -> bytes:
@@ -264,6 +265,7 @@ def _timed(
         notes = [*untimed, *midnight, *days, *against_interval(columns, clock, readings, source)]
     if "time_s" not in columns or not any(name.startswith("current_") for name in columns):
         return columns, notes
+    require_one_block(columns, source)
     columns, doubled = without_doubled_rows(columns)
     columns, whole = with_whole_time(columns)
     columns, running = with_running_time(columns, clock, source)

@@ -6,6 +6,7 @@ import pytest
 from commissioner.errors import DataRefused
 from commissioner.recordings.imported import understand
 from commissioner.recordings.importers import read_running
+from commissioner.recordings.reading.mend import require_one_block
 from commissioner.recordings.table import Table, to_standstill
 
 NAMES = "Time (s),Ia (A),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)"
@@ -39,6 +40,29 @@ def test_header_lines_among_the_countare_left_out(tmp_path, header):
     recording, codes = read(written(tmp_path, [*header, *body[:250], *header, *body[250:]]))
     assert codes == {"header_again"} and recording.sample_period_s == pytest.approx(STEP_S)
     np.testing.assert_allclose(recording.currents_a[0], SIGNALS[0], atol=1e-4)
+
+
+@pytest.mark.parametrize("between", [[], [",,,,,,"], [NAMES], ["", NAMES]])
+@pytest.mark.parametrize(
+    "first", [NAMES, "time_s,current_u_a,current_v_a,current_w_a,voltage_u_v,voltage_v_v,voltage_w_v"]
+)
+def test_a_second_recording_below_the_first_is_refused(tmp_path, between, first):
+    between = [first if line == NAMES else line for line in between]
+    with pytest.raises(DataRefused, match=r"begins again in row 601 of its numbers: 2 recordings") as refusal:
+        read_running(written(tmp_path, [first, *rows(), *between, *rows()[:300]]))
+    assert refusal.value.value == "from 0.2995 s back to 0 s" and "a file of its own" in refusal.value.remedy
+
+
+def test_a_second_recording_that_goes_on_in_time_belongs_to_the_first(tmp_path):
+    later = [f"{t + 0.3:.4f}" for t in TIME]
+    assert read_running(written(tmp_path, [NAMES, *rows(), NAMES, *rows(later)])).time_s.size == 1200
+
+
+def test_a_time_that_begins_again_in_each_segment_is_read():
+    columns = {"time_s": np.tile(TIME, 2), "current_u_a": np.tile(SIGNALS[0], 2), "segment": np.repeat([0.0, 1.0], 600)}
+    require_one_block(columns, "x")
+    with pytest.raises(DataRefused, match="begins again"):
+        require_one_block({**columns, "segment": np.zeros(1200)}, "x")
 
 
 def test_header_lines_do_not_count_where_the_countmake_the_time(tmp_path):
