@@ -85,6 +85,10 @@ class SampleBlock:
         return int(self.current_u_a.shape[0])
 
 
+UNUSED_VOLTAGE = "unused_voltage"
+"""Code of the note that a column in volts could not be used, where no other was."""
+
+
 @dataclass(frozen=True)
 class ReadingNote:
     """What a reader changed in a recording, or left unused; `code` for programs, `what` for people."""

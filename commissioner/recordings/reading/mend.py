@@ -174,6 +174,16 @@ def against_interval(
     return [ReadingNote("interval", f"{said}: the stamps are used")]
 
 
+def without_empty_columns(
+    columns: Mapping[str, Signal], readings: Sequence[ColumnReading]
+) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns without those that mean something and in which no cell is a number."""
+    called = {r.meaning: r.name for r in readings if r.meaning}
+    empty = [name for name, v in columns.items() if name in called and v.size and not np.isfinite(v).any()]
+    notes = [ReadingNote("no_number", f"no cell of {called[name]} is a number: not used") for name in empty]
+    return {name: v for name, v in columns.items() if name not in empty}, notes
+
+
 def without_doubled_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
     """The columns without rows that repeat the one before them in every cell."""
     time = columns.get("time_s")

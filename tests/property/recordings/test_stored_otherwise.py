@@ -195,16 +195,21 @@ def test_channels_of_a_tdms_file_that_begin_at_different_times_are_laid_together
     [
         ([("wf_start_offset", 7.3 * STEP)], [], "part of a sample apart"),
         ([("wf_start_offset", 1e3)], [], "no time in common"),
-        ([], [("wf_start_time", stamp(5)), ("wf_start_offset", 0.0)], None),
     ],
 )
 def test_channels_of_a_tdms_file_that_cannot_be_laid_together_are_refused(tmp_path, late, early, match):
-    path = late_tdms(tmp_path / "a.tdms", 0, late, early)
-    if match is None:
-        assert_same(path)  # one begin that is not told, the others alike
-        return
     with pytest.raises(DataRefused, match=match):
-        contract_table(path)
+        contract_table(late_tdms(tmp_path / "a.tdms", 0, late, early))
+
+
+def test_a_begin_of_a_tdms_channel_that_is_not_told_is_asked_for_where_others_differ(tmp_path):
+    at = [("wf_start_time", stamp(5))]
+    assert_same(late_tdms(tmp_path / "a.tdms", 0, [], at))
+    channels = [(name, MEANT[name], [("wf_increment", STEP), *at]) for name in SIGNALS]
+    channels[0][2][1:] = []
+    channels[1][2].append(("wf_start_offset", STEP))
+    with pytest.raises(DataRefused, match="when Data.current_u_a begins is not told"):
+        contract_table(tdms(tmp_path / "a.tdms", channels))
 
 
 @pytest.mark.parametrize(("digits", "unit"), [("000000", 1e6), ("000000000", 1e9)])

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
+from commissioner.monitor.partial import Partial, without_plate
 from commissioner.recordings.imported import understand
-from commissioner.recordings.importers import read_running
+from commissioner.recordings.importers import contract_table, has_currents_only, read_running
 from commissioner.recordings.reading.mend import require_one_block
-from commissioner.recordings.table import Table, to_standstill
+from commissioner.recordings.table import Table, to_currents, to_standstill
+from commissioner.records import UNUSED_VOLTAGE
 
 NAMES = "Time (s),Ia (A),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)"
 STEP_S = 5e-4
@@ -149,3 +151,27 @@ def test_a_link_without_voltage_is_no_drives(volts):
     table = Table(columns | {"time_s": np.arange(count) * 2e-4, "dc_link_v": np.full(count, volts)}, {}, "x.csv")
     with pytest.raises(DataRefused, match="dc_link_v is no DC link's voltage"):
         to_standstill(table)
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "said"),
+    [
+        ("Va (V),Vb (V),Vc (V)", "n/a", "from Va (V), Vb (V), Vc (V): no numbers"),
+        ("Spg. links (V),Spg. Mitte (V),Spg. rechts (V)", "1.5", "Spg. rechts (V): not named by a phase"),
+    ],
+)
+def test_voltages_that_could_not_be_read_are_named(tmp_path, names, values, said):
+    head = NAMES.replace("Va (V),Vb (V),Vc (V)", names)
+    currents = [row.split(",")[1:4] for row in rows()] * 4
+    lines = [",".join([f"{k * STEP_S:.4f}", *cells, *[values] * 3]) for k, cells in enumerate(currents)]
+    table = contract_table(written(tmp_path, [head, *lines]))
+    assert has_currents_only(table) and said in next(n.what for n in table.notes if n.code == UNUSED_VOLTAGE)
+    seen = without_plate(to_currents(table))
+    assert isinstance(seen, Partial) and said in seen.withheld["power_w"]
+
+
+def test_a_voltage_without_numbers_is_named_where_the_others_do_not_suffice(tmp_path):
+    lines = [",".join([*row.split(",")[:6], "n/a"]) for row in rows()]
+    with pytest.raises(DataRefused, match="lacks three phase voltages") as refusal:
+        read_running(written(tmp_path, [NAMES, *lines]))
+    assert "no cell of Vc (V) is a number" in refusal.value.value
