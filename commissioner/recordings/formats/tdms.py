@@ -90,8 +90,10 @@ def _begins(said: Mapping[str, Mapping[str, Property]]) -> dict[str, float | Non
     out: dict[str, float | None] = {}
     for name, one in said.items():
         at, offset = stamps.get(name, unstamped), one.get("wf_start_offset", 0.0)
-        is_told = at is not None and "wf_increment" in one and isinstance(offset, float)
-        out[name] = at.seconds - first + at.parts / 2**64 + offset if is_told else None
+        if at is None or "wf_increment" not in one or not isinstance(offset, float):
+            out[name] = None
+        else:
+            out[name] = at.seconds - first + at.parts / 2**64 + offset
     return out
 
 

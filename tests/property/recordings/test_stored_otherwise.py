@@ -208,7 +208,7 @@ def test_a_begin_of_a_tdms_channel_that_is_not_told_is_asked_for_where_others_di
     channels = [(name, MEANT[name], [("wf_increment", STEP), *at]) for name in SIGNALS]
     channels[0][2][1:] = []
     channels[1][2].append(("wf_start_offset", STEP))
-    with pytest.raises(DataRefused, match="when Data.current_u_a begins is not told"):
+    with pytest.raises(DataRefused, match=r"when Data\.current_u_a begins is not told"):
         contract_table(tdms(tmp_path / "a.tdms", channels))
 
 
