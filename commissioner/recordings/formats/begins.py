@@ -27,15 +27,15 @@ def from_last_begin(
         raise _refused(
             source, f"when {untold[0]} begins is not told, and other channels begin apart", late[last], period_s
         )
+    if not min(values[name].size - (late[last] - samples) for name, samples in late.items()) >= 1.0 - MOST_OFF:
+        raise _refused(
+            source, f"the channels have no time in common: {last} begins when others end", late[last], period_s
+        )
     early = {name: round(late[last] - samples) for name, samples in late.items()}
     odd = next((name for name in late if abs(late[last] - late[name] - early[name]) > MOST_OFF), None)
     if odd is not None:
         raise _refused(source, f"{odd} and {last} begin a part of a sample apart", late[last] - late[odd], period_s)
     rows = min(values[name].size - first for name, first in early.items())
-    if rows < 1:
-        raise _refused(
-            source, f"the channels have no time in common: {last} begins when others end", late[last], period_s
-        )
     cut = {name: values[name][first : first + rows] for name, first in early.items()}
     first = min(late, key=late.__getitem__)
     note = ReadingNote(

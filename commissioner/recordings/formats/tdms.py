@@ -90,7 +90,7 @@ def _begins(said: Mapping[str, Mapping[str, Property]]) -> dict[str, float | Non
     out: dict[str, float | None] = {}
     for name, one in said.items():
         at, offset = stamps.get(name, unstamped), one.get("wf_start_offset", 0.0)
-        if at is None or "wf_increment" not in one or not isinstance(offset, float):
+        if at is None or "wf_increment" not in one or not (isinstance(offset, float) and np.isfinite(offset)):
             out[name] = None
         else:
             out[name] = at.seconds - first + at.parts / 2**64 + offset

@@ -195,6 +195,7 @@ def test_channels_of_a_tdms_file_that_begin_at_different_times_are_laid_together
     [
         ([("wf_start_offset", 7.3 * STEP)], [], "part of a sample apart"),
         ([("wf_start_offset", 1e3)], [], "no time in common"),
+        ([("wf_start_offset", 1e308)], [], "no time in common"),
     ],
 )
 def test_channels_of_a_tdms_file_that_cannot_be_laid_together_are_refused(tmp_path, late, early, match):
@@ -205,6 +206,7 @@ def test_channels_of_a_tdms_file_that_cannot_be_laid_together_are_refused(tmp_pa
 def test_a_begin_of_a_tdms_channel_that_is_not_told_is_asked_for_where_others_differ(tmp_path):
     at = [("wf_start_time", stamp(5))]
     assert_same(late_tdms(tmp_path / "a.tdms", 0, [], at))
+    assert_same(late_tdms(tmp_path / "a.tdms", 0, [("wf_start_offset", float("nan"))], []))
     channels = [(name, MEANT[name], [("wf_increment", STEP), *at]) for name in SIGNALS]
     channels[0][2][1:] = []
     channels[1][2].append(("wf_start_offset", STEP))
