@@ -40,8 +40,10 @@ POINT_FORMS = ("voltage_neutral_v", "voltage_phase_v", "current_phase_a", *WATT_
 DIRECT_TEST, IDLE_TEST, LOCKED_TEST, SINGLE_PHASE_TEST = 0.0, 1.0, 2.0, 3.0
 """In the column `test` of a test sheet; the last: a locked rotor with single-phase alternating current."""
 TERMINAL_PAIRS = ("winding_resistance_uv_ohm", "winding_resistance_vw_ohm", "winding_resistance_wu_ohm")
+WINDINGS = ("winding_resistance_u_ohm", "winding_resistance_v_ohm", "winding_resistance_w_ohm")
 POINT_RESISTANCES = (
     *TERMINAL_PAIRS,
+    *WINDINGS,
     "winding_resistance_line_ohm",
     "terminal_resistance_ohm",
     "winding_resistance_phase_ohm",
@@ -81,6 +83,10 @@ class SampleBlock:
     @property
     def count(self) -> int:
         return int(self.current_u_a.shape[0])
+
+
+UNUSED_VOLTAGE = "unused_voltage"
+"""Code of the note that a column in volts could not be used, where no other was."""
 
 
 @dataclass(frozen=True)

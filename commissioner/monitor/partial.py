@@ -32,7 +32,7 @@ from commissioner.monitor.trend.indicators import rotor_side_bands
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_current, stator_impedance
-from commissioner.records import RunningRecording
+from commissioner.records import UNUSED_VOLTAGE, RunningRecording
 
 SLIP_TRUST = 0.5
 """Relative standard deviation of the slip that a current alone suggests: at light load it is that of the magnetizing current."""
@@ -100,7 +100,7 @@ def of_currents(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -
     indicators = {"current_rms_a": current / np.sqrt(2.0), "current_unbalance": audited.fundamental.current_unbalance}
     withheld = dict.fromkeys(
         ("mean_torque_nm", "parameters", "power_w", "reactive_power_var", "power_factor", "voltage_unbalance"),
-        NO_VOLTAGE,
+        _no_voltage(recording),
     )
     speed, by_slip = None, None
     if trouble is None and found.shaft is not None:
@@ -119,6 +119,11 @@ def of_currents(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -
     hidden = {"third_voltage", "crossed_channels", "computed_voltage"}
     notes = tuple(f for f in audited.findings if f.code not in hidden)
     return Partial(speed, None, supply / (2 * np.pi), own, indicators, withheld, notes, by_slip)
+
+
+def _no_voltage(recording: RunningRecording) -> str:
+    """Why there is none: the columns in volts that could not be used, or that there are none."""
+    return next((note.what for note in recording.notes if note.code == UNUSED_VOLTAGE), NO_VOLTAGE)
 
 
 def without_plate(recording: RunningRecording) -> Partial | Finding:
@@ -151,7 +156,9 @@ def without_plate(recording: RunningRecording) -> Partial | Finding:
     }  # fmt: skip
     withheld = dict.fromkeys(("mean_speed_rad_per_s", "mean_torque_nm", "parameters"), NO_PLATE)
     if not has_volts:
-        withheld |= dict.fromkeys(("power_w", "reactive_power_var", "power_factor", "voltage_unbalance"), NO_VOLTAGE)
+        withheld |= dict.fromkeys(
+            ("power_w", "reactive_power_var", "power_factor", "voltage_unbalance"), _no_voltage(recording)
+        )
     return Partial(None, None, f.frequency_hz, _lines(frame, f.frequency_hz), indicators, withheld)
 
 

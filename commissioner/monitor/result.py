@@ -158,7 +158,7 @@ def partial_document(part: Partial, stretches: list[State], audited: Audited) ->
         "withheld": dict(part.withheld),
         "trend": None,
         "states": stretches,
-        "audit": audit_document(audited, (*audited.findings, *part.findings)),
+        "audit": audit_document(audited, tuple(dict.fromkeys((*audited.findings, *part.findings)))),
         "quantities": QUANTITIES,
     }
 

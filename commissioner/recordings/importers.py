@@ -28,6 +28,7 @@ from commissioner.recordings.reading.mend import (
     TIME_MADE,
     against_interval,
     from_days,
+    require_one_block,
     require_seconds,
     require_stamps,
     through_midnight,
@@ -35,6 +36,7 @@ from commissioner.recordings.reading.mend import (
     with_time,
     with_whole_time,
     without_doubled_rows,
+    without_empty_columns,
     without_untimed_rows,
 )
 from commissioner.recordings.reading.preface import Clock, clock_in
@@ -51,12 +53,12 @@ from commissioner.recordings.table import (
     to_running,
     typed_metadata,
 )
-from commissioner.recordings.units import unit_in
-from commissioner.records import ReadingNote, RunningRecording, Signal
+from commissioner.recordings.units import read_unit, unit_in
+from commissioner.records import UNUSED_VOLTAGE, ReadingNote, RunningRecording, Signal
 
 _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]]] = {
     ".mat": structures.channels,
-    ".tdms": lambda path: (*tdms.channels(path), ()),
+    ".tdms": tdms.channels,
     ".mf4": lambda path: (mdf4.channels(path), {}, ()),
     ".cfg": comtrade.channels,
     ".dat": comtrade.channels,
@@ -105,9 +107,21 @@ def contract_table(path: Path, mapping: ChannelMap | None = None, motor: str | N
     UsageError: no such file. DataRefused: no table, or one that can be read in two ways.
     """
     table = _read(path, mapping or ChannelMap())
-    if not any(note.code == UNNAMED for note in table.notes) or (motor is None and has_no_plate(table.metadata)):
-        return table
-    return told_by_signals(table, plate_of(table.metadata, table.source, motor))
+    is_unnamed = any(note.code == UNNAMED for note in table.notes)
+    if is_unnamed and not (motor is None and has_no_plate(table.metadata)):
+        table = told_by_signals(table, plate_of(table.metadata, table.source, motor))
+    return _without_voltages(table) if has_currents_only(table) else table
+
+
+def _without_voltages(table: Table) -> Table:
+    """With a note of the columns in volts that could not be used, where there are any."""
+    volts = [r for r in table.readings if (unit := read_unit(r.unit)) and unit.measures == "voltage"]
+    empty = [r.name for r in table.readings if (r.meaning or "").startswith("voltage_")]
+    unnamed = [r.name for r in volts if r.meaning is None]
+    why = [f"{', '.join(empty)}: no numbers in the rows of the currents"] if empty else []
+    why += [f"{', '.join(unnamed)}: not named by a phase, as Vu, Vv, Vw ({HOW_TO_MAP})"] if unnamed else []
+    note = ReadingNote(UNUSED_VOLTAGE, f"no voltages could be read from {'; '.join(why)}")
+    return replace(table, notes=(*table.notes, note)) if why else table
 
 
 def _read(path: Path, mapping: ChannelMap) -> Table:
@@ -145,7 +159,7 @@ def _another_way(path: Path, mapping: ChannelMap, refusal: DataRefused) -> Table
     try:
         return _of_text(path, mapping)
     except DataRefused as second:
-        raise (second if second.step in {"read numbers", "recognise columns"} else refusal) from None
+        raise (second if second.step in {"read numbers", "recognise columns", "read the time"} else refusal) from None
 
 
 def _head(path: Path) -> bytes:
@@ -264,10 +278,12 @@ def _timed(
         notes = [*untimed, *midnight, *days, *against_interval(columns, clock, readings, source)]
     if "time_s" not in columns or not any(name.startswith("current_") for name in columns):
         return columns, notes
+    require_one_block(columns, source)
+    columns, empty = without_empty_columns(columns, readings)
     columns, doubled = without_doubled_rows(columns)
     columns, whole = with_whole_time(columns)
     columns, running = with_running_time(columns, clock, source)
-    return columns, [*notes, *doubled, *whole, *running]
+    return columns, [*notes, *empty, *doubled, *whole, *running]
 
 
 def _of_one_length(columns: Mapping[str, Signal]) -> dict[str, Signal]:
@@ -290,7 +306,7 @@ def _lacks(table: Table, missing: list[str]) -> DataRefused:
     return DataRefused(
         f"{table.source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
         step="recognise columns",
-        value=_some(table.columns),
+        value="; ".join([_some(table.columns), *(note.what for note in table.notes if note.code == "no_number")]),
         limit="time_s, three line currents and three voltages, in SI units",
         remedy=f"{HOW_TO_MAP}; three currents and three voltages with units may be told by their signals where the plate is given (--motor)"
         if unnamed else "record all six channels against time, or rename the columns to the contract's (time_s, "

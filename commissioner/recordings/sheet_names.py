@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from commissioner.recordings.names import ALPHABETS, PHASES, is_remark, key_of, meanings_of
 from commissioner.recordings.units import IN_NAME, unit_in
 from commissioner.recordings.words import readings
-from commissioner.records import WATT_METERS
+from commissioner.records import WATT_METERS, WINDINGS
 
 _VOLTS = r"(?:v|u|e|voltage|volts?|spannung|tension)"
 _AMPS = r"(?:i|current|amps?|strom|courant)"
@@ -43,21 +43,25 @@ FORMS = {
 }  # fmt: skip
 """What a test sheet needs, in any of these columns or, of volts and amperes, in those of each phase."""
 _OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|standerwicklungs)*(?:resistance|widerstand|r)"
+_PER_PHASE = r"(?:per|pro|je)?(?:phase|strang)"
 SHEET_RESISTANCE = {
     "winding_resistance_line_ohm": re.compile(
         r"(?:terminals?|line(?:toline)?|klemmen)(?:winding)?(?:resistance|widerstand)|rll"
-        rf"|{_OF_WINDING}(?:(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)|betweenphases?)"
+        rf"|{_OF_WINDING}(?:(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)|betweenphases?|phasetophase)"
     ),
     "winding_resistance_phase_ohm": re.compile(
-        r"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand)(?:per|pro|je)?(?:phase|strang)"
+        rf"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand){_PER_PHASE}"
+        rf"|(?:resistance|widerstand)(?:winding{_PER_PHASE}|{_PER_PHASE}winding|(?:per|je|pro)(?:winding|wicklung|strang))"
     ),
-    "winding_resistance_ohm": re.compile(r"windings?resistance|wicklungswiderstand"),
+    "winding_resistance_ohm": re.compile(r"windings?resistance|resistanceof(?:the)?windings?|wicklungswiderstand"),
     "phase_resistance_ohm": re.compile(r"phases?(?:resistance|nwiderstand)|rph(?:ase)?|resistanceperphase"),
     "stator_resistance_ohm": re.compile(r"(?:stator|stander)(?:winding|wicklungs)?(?:resistance|widerstand)|rs|r1"),
     "resistance_ohm": re.compile(r"resistance|widerstand"),
 }
 """Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
 _TERMINALS = re.compile(rf"{_OF_WINDING}(?:between)?(?:terminals)?l?([abcuvwrst123])l?([abcuvwrst123])")
+_WINDING = re.compile(rf"{_OF_WINDING}(?:(?:of)?(?:phase|winding|strang)l?([123uvwabcrst])|l([123])|([uvwabcrst]))")
+"""One of the three windings, by its phase; a bare number (`R1`) may be a measurement's, or the stator's beside the rotor's."""
 _OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
 _WATT_METER = re.compile(
     r"(?:p|w|power|watts?|wattmeter|leistung|puissance|potencia)l?([123])|(?:p|power)l?([uvwabcrst])"
@@ -81,10 +85,11 @@ def sheet_columns(names: Iterable[str]) -> dict[str, str]:
     """Names of a test sheet that mean a column which no recording has, with it: volts, amperes, watts, hertz and ohms. Of three
     meters (`I_a`, `I_b`, `I_c`) none is one with its unit behind it (`I_a`)."""
     names = [n for n in names if n]
-    meters = meanings_of(names)
+    windings = winding_columns(names)
+    meters = meanings_of([n for n in names if n not in windings])
     several = {m[:7] for m in meters.values() if len({other for other in meters.values() if other[:7] == m[:7]}) > 1}
     own = {n: c for n in names if (c := sheet_meaning(n)) and (n in SHEET or meters.get(n, "")[:7] not in several)}
-    own |= _watt_meters(names)
+    own |= _watt_meters(names) | windings
     return own | {n: c for n in names if n not in own and (c := resistance_meaning(n))}
 
 
@@ -104,10 +109,30 @@ def _watt_meters(names: Iterable[str]) -> dict[str, str]:
     return {name: WATT_METERS[k] for name, k in found.items()} if is_clear else {}
 
 
+def winding_columns(names: Iterable[str]) -> dict[str, str]:
+    """Names of three windings' resistances (`R_U [Ohm]`, `R_V [Ohm]`, `R_W [Ohm]`) with the column of each; nothing of fewer."""
+    found = {name: phase for name in names if (phase := _first(name, _of_one_winding))}
+    return (
+        {name: WINDINGS["uvw".index(phase)] for name, phase in found.items()}
+        if sorted(found.values()) == [*"uvw"]
+        else {}
+    )
+
+
 def resistance_meaning(name: str) -> str | None:
     """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None."""
+    return _first(name, _of_resistance)
+
+
+def _first(name: str, told: Callable[[str], str | None]) -> str | None:
+    """What the first reading of a name, without its unit, tells."""
     bare = _OHM_ENDING.sub("", IN_NAME.sub("", name).strip())
-    return next((column for reading in readings(bare) if (column := _of_resistance(key_of(reading)))), None)
+    return next((found for reading in readings(bare) if (found := told(key_of(reading)))), None)
+
+
+def _of_one_winding(key: str) -> str | None:
+    found = _WINDING.fullmatch(key)
+    return PHASES[found[1] or found[2] or found[3]] if found else None
 
 
 def _of_resistance(key: str) -> str | None:

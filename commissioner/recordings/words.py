@@ -36,6 +36,10 @@ TRANSLATED = {
     "resistencia": "resistance", "resistenza": "resistance", "résistance": "resistance", "widerstand": "resistance",
     "estator": "stator", "statore": "stator", "statorique": "stator", "estatórica": "stator", "statorica": "stator",
     "devanado": "winding", "bobinado": "winding", "arrollamiento": "winding", "avvolgimento": "winding", "enroulement": "winding",
+    "enroulements": "winding", "devanados": "winding", "bobinados": "winding", "avvolgimenti": "winding", "enrolamento": "winding",
+    "enrolamentos": "winding", "do enrolamento": "winding", "dos enrolamentos": "winding", "do estator": "stator", "par enroulement": "per winding", "terminais": "terminals",
+    "tra le fasi": "between phase", "fra le fasi": "between phase", "fra i": "between", "fra le": "between",
+    "lignes": "line", "líneas": "line", "linhas": "line", "linee": "line",
     "bornes": "terminals", "bornas": "terminals", "terminales": "terminals", "terminali": "terminals", "morsetti": "terminals",
     "entre": "between", "tra": "between", "fra": "between", "por": "per", "línea": "line", "linea": "line", "ligne": "line",
     "fase": "phase", "fases": "phase", "fasi": "phase", "simple": "phase", "semplice": "phase", "stellata": "star", "sternspannung": "star spannung",
@@ -57,7 +61,7 @@ TRANSLATED = {
     "periodo di campionamento": "sample period", "tempo di campionamento": "sample period", "intervallo di campionamento": "sample interval",
     "frequenza di campionamento": "sample rate", "passo di campionamento": "sample interval",
     "de": " ", "del": " ", "de la": " ", "di": " ", "dello": " ", "della": " ", "du": " ", "des": " ", "d'": " ", "dell'": " ",
-    "en la": " ", "nella": " ", "al": " ", "allo": " ", "alla": " ",
+    "l'": " ", "d'un": " ", "de los": " ", "degli": " ", "en la": " ", "nella": " ", "al": " ", "allo": " ", "alla": " ",
 }  # fmt: skip
 """What only joins names is a space. With their accents, which name the code page of a text; looked for with or without them."""
 

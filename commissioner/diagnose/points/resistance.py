@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import connection_of
-from commissioner.records import POINT_RESISTANCES, TERMINAL_PAIRS
+from commissioner.records import POINT_RESISTANCES, TERMINAL_PAIRS, WINDINGS
 
 Array = NDArray[np.float64]
 KINDS: Mapping[str, str] = {
@@ -31,6 +31,7 @@ SYNONYMS = {
 }  # fmt: skip
 SAID_BY_NAME: Mapping[str, str] = {
     **dict.fromkeys(TERMINAL_PAIRS, "line_to_line"),
+    **dict.fromkeys(WINDINGS, "phase_winding"),
     "winding_resistance_line_ohm": "line_to_line",
     "terminal_resistance_ohm": "line_to_line",
     "winding_resistance_phase_ohm": "phase_winding",
@@ -43,8 +44,8 @@ ROTOR_OVER_SLIP = (0.35, 6.6)
 """R_R over rated slip and base impedance: the plate's box (`motor.nameplate`), three times its end for displacement."""
 
 
-PAIRS_APART = 0.1
-"""By which the resistances between three pairs of terminals may differ: sound windings by one or two per cent."""
+APART = {TERMINAL_PAIRS: 0.1, WINDINGS: 0.02}
+"""By which the resistances between three pairs of terminals, or of three windings, may differ: sound ones by one or two per cent."""
 LIKE_RESISTANCE = re.compile(r"ohm|\u03a9|\u2126|r[eé]sist|widerstand|^r(?:[ _-]|$)", re.IGNORECASE)
 
 
@@ -60,11 +61,14 @@ def column_of(
     columns: Mapping[str, Array], metadata: Mapping[str, float | str]
 ) -> tuple[str, Array] | DataRefused | None:
     """Name and values `(n,)` of the resistance that a table gives, as a column or once for all rows; of several pairs of
-    terminals their mean. DataRefused: the pairs are not of one winding."""
+    terminals, or of the three windings, their mean. DataRefused: they are not of one motor that is sound."""
     rows = next(iter(columns.values())).size
     given = {n: ohm for n in POINT_RESISTANCES if (ohm := _given(n, columns, metadata, rows)) is not None}
-    pairs = {name: given[name] for name in TERMINAL_PAIRS if name in given}
-    return _of_pairs(pairs) if len(pairs) > 1 else next(iter(given.items()), None)
+    for names, apart in APART.items():
+        alike = {name: given[name] for name in names if name in given and np.isfinite(given[name]).any()}
+        if alike:
+            return _mean(alike, apart)
+    return next(iter(given.items()), None)
 
 
 def _given(name: str, columns: Mapping[str, Array], metadata: Mapping[str, float | str], rows: int) -> Array | None:
@@ -74,20 +78,21 @@ def _given(name: str, columns: Mapping[str, Array], metadata: Mapping[str, float
     return np.full(rows, float(said)) if isinstance(said, float | int) else None
 
 
-def _of_pairs(pairs: Mapping[str, Array]) -> tuple[str, Array] | DataRefused:
-    means = {name: float(np.mean(ohm)) for name, ohm in pairs.items()}
-    if max(means.values()) > (1.0 + PAIRS_APART) * min(means.values()):
+def _mean(alike: Mapping[str, Array], apart: float) -> tuple[str, Array] | DataRefused:
+    means = {name: float(np.nanmean(ohm)) for name, ohm in alike.items()}
+    if max(means.values()) > (1.0 + apart) * min(means.values()):
         return refused(
-            "the resistances between the terminals differ", ", ".join(f"{name} {ohm:.4g}" for name, ohm in means.items()),
-            f"{PAIRS_APART:.0%} between the largest and the least",
+            "the resistances between the terminals differ" if set(alike) <= set(TERMINAL_PAIRS) else "the windings' resistances differ",
+            ", ".join(f"{name} {ohm:.4g}" for name, ohm in means.items()), f"{apart:.0%} between the largest and the least",
             "check their units and the contacts; a winding of other resistance than its neighbours is a fault of the motor",
         )  # fmt: skip
-    return next(iter(pairs)), np.asarray(np.mean(list(pairs.values()), axis=0))
+    return next(iter(alike)), np.asarray(np.mean(list(alike.values()), axis=0))
 
 
-def unread_columns(columns: Iterable[str]) -> list[str]:
-    """Columns that look like the windings' resistance and are called by no name that is known."""
-    return [name for name in columns if name not in POINT_RESISTANCES and LIKE_RESISTANCE.search(name)]
+def unread(columns: Iterable[str], metadata: Mapping[str, float | str]) -> list[str]:
+    """Columns, and lines above them, that look like the windings' resistance and are called by no name that is known."""
+    lines = [name for name, said in metadata.items() if str(said).strip()[:1].isdigit()]
+    return [name for name in (*columns, *lines) if name not in POINT_RESISTANCES and LIKE_RESISTANCE.search(name)]
 
 
 def star_resistance(
@@ -101,9 +106,10 @@ def star_resistance(
     if isinstance(told, DataRefused):
         return told
     readings = _readings(told, str(connection_of(metadata.get("connection", ""))))
-    if not readings:
+    if told == "phase_winding" and len(readings) > 1:
         return refused(
-            f"{name} is of one winding, and whether the windings are in star or in delta is not told", float(ohm[0]),
+            f"{name} is of one winding, and whether the windings are in star or in delta is not told",
+            "; ".join(_left(kind, f, ohm, measured_ohm, is_locked=is_locked) for kind, f in readings),
             "connection: star, or delta", "add `# connection: star` (or delta) to the table, or give --motor",
         )  # fmt: skip
     possible = [r for r in readings if _is_possible(r[1] * ohm, measured_ohm, metadata, is_locked=is_locked)]
@@ -151,7 +157,7 @@ def _readings(told: str | None, connection: str) -> list[tuple[str, float]]:
     if told == "star_equivalent":
         return [("of a star phase", 1.0)]
     if told == "phase_winding":
-        return winding if len(winding) == 1 else []
+        return winding
     return [("between two terminals", 0.5), *winding, ("of a star phase", 1.0)]
 
 

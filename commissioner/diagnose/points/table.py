@@ -11,7 +11,7 @@ import numpy as np
 
 from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
-from commissioner.diagnose.points.resistance import column_of, star_resistance, unread_columns
+from commissioner.diagnose.points.resistance import column_of, star_resistance, unread
 from commissioner.errors import DataRefused
 from commissioner.records import POINT_COLUMNS, POINT_FORMS
 
@@ -77,7 +77,7 @@ def read_points(
         return refusal
     remarks = [f"{copies} rows are copies of others: each was taken once."] if copies else []
     if resistance is None:
-        remarks.append(_without_resistance(columns))
+        remarks.append(_without_resistance(columns, said))
         return Points(name, f, v, i, p, None, is_locked, tuple(remarks))
     ohm = star_resistance(resistance[0], rows[:, 4], p / (3.0 * i**2), said, is_locked=is_locked)
     if isinstance(ohm, DataRefused):
@@ -85,13 +85,13 @@ def read_points(
     return Points(name, f, v, i, p, ohm.star_ohm, is_locked, (*remarks, *ohm.remarks))
 
 
-def _without_resistance(columns: Mapping[str, Array]) -> str:
+def _without_resistance(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> str:
     """Why none is known, and what follows from it."""
-    unread = unread_columns(columns)
+    left = unread(columns, said)
     why = (
-        f"What is in {', '.join(unread)} was not understood as a winding resistance and not used; name it winding_resistance_uv_ohm "
+        f"What is in {', '.join(left)} was not understood as a winding resistance and not used; name it winding_resistance_uv_ohm "
         "(between two terminals) or winding_resistance_phase_ohm (of one winding)"
-        if unread
+        if left
         else "No winding resistance is given (column winding_resistance_uv_ohm, between two terminals, at every point)"
     )
     return f"{why}: windings that warm up or cool down during the test count as the rotor's resistance or as loss."

@@ -17,7 +17,7 @@ from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
 from commissioner.diagnose.points.meters import is_direct
-from commissioner.diagnose.points.resistance import column_of, star_resistance
+from commissioner.diagnose.points.resistance import column_of, star_resistance, unread
 from commissioner.diagnose.points.table import LEAST_POINTS, lacking
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import InverseGamma
@@ -281,8 +281,9 @@ def _stator(
                 return given
             if given.star_ohm is not None:
                 return float(given.star_ohm[0]), " ".join((f"R_s from {found[0]}.", *given.remarks))
+    left = dict.fromkeys(name for table in tables for name in unread(table, said))
     return refused(
-        "the stator's resistance is not given", None, "a row of direct current, or winding_resistance_uv_ohm",
+        "the stator's resistance is not given", f"not understood: {', '.join(left)}" if left else None, "a row of direct current, or winding_resistance_uv_ohm",
         "add the direct-current test (frequency 0, volts and amperes between two terminals)",
     )  # fmt: skip
 

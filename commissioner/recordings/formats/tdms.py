@@ -1,20 +1,22 @@
 """Channels of a TDMS file (National Instruments, "TDMS File Format Internal Structure", version 2.0).
 
 Read are numeric channels of interleaved and contiguous segments, with linear NI scaling, and their waveform properties.
-DAQmx raw data, extended floats and other scalings are refused by name; texts and time stamps are passed over.
+Channels that began at different times are cut to what all of them have. DAQmx raw data, extended floats and other scalings are
+refused by name; texts and channels of time stamps are passed over.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, too_large
+from commissioner.recordings.formats.begins import from_last_begin
 from commissioner.recordings.formats.stretch import Stretch
-from commissioner.records import Signal
+from commissioner.records import ReadingNote, Signal
 
 _META, _NEW_LIST, _RAW, _INTERLEAVED, _BIG_ENDIAN, _DAQMX = 1 << 1, 1 << 2, 1 << 3, 1 << 5, 1 << 6, 1 << 7
 _NO_DATA, _AS_BEFORE, _UNFINISHED = 0xFFFFFFFF, 0, 0xFFFFFFFFFFFFFFFF
@@ -25,7 +27,16 @@ _TYPES = {
 _TEXT, _TIME_STAMP = 0x20, 0x44
 MAX_SEGMENTS = 200_000
 
-Property = float | str | None
+
+@dataclass(frozen=True)
+class _Stamp:
+    """Since the beginning of 1904: whole seconds, and parts of one in 2^-64."""
+
+    seconds: int
+    parts: int
+
+
+Property = float | str | _Stamp
 
 
 @dataclass
@@ -45,10 +56,10 @@ class _Channel:
         return np.dtype("V16") if self.kind == _TIME_STAMP else np.dtype(order + _TYPES[self.kind])
 
 
-def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
-    """(values by `group.channel [unit]`, the file's properties and the sample period where all channels agree on one).
+def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]:
+    """(values by `group.channel [unit]`, the file's properties and the sample period where all channels agree on one, what was cut).
 
-    DataRefused: damaged, too large, or not read here.
+    DataRefused: damaged, too large, not read here, or channels that began a part of a sample apart.
     """
     file, objects = Stretch.of_file(path, "TDMS"), dict[str, _Channel]()
     active: list[str] = []
@@ -65,12 +76,37 @@ def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
     values = {
         _name(key, channel): _scaled(channel, _above(key, channel, objects), file) for key, channel in held.items()
     }
-    return values, _metadata(objects, list(held.values()))
+    several = {
+        _name(key, channel): channel.properties for key, channel in held.items() if values[_name(key, channel)].size > 1
+    }
+    values, notes = from_last_begin(values, _begins(several), _period(several.values()), str(path))
+    return values, _metadata(objects, list(held.values())), notes
+
+
+def _begins(said: Mapping[str, Mapping[str, Property]]) -> dict[str, float | None]:
+    """When each channel begins, s from the first stamp of any; None where it is no waveform, or has no stamp and others have."""
+    stamps = {name: at for name, one in said.items() if isinstance(at := one.get("wf_start_time"), _Stamp)}
+    first, unstamped = min((at.seconds for at in stamps.values()), default=0), None if stamps else _Stamp(0, 0)
+    out: dict[str, float | None] = {}
+    for name, one in said.items():
+        at, offset = stamps.get(name, unstamped), one.get("wf_start_offset", 0.0)
+        if at is None or "wf_increment" not in one or not (isinstance(offset, float) and np.isfinite(offset)):
+            out[name] = None
+        else:
+            out[name] = at.seconds - first + at.parts / 2**64 + offset
+    return out
+
+
+def _period(said: Iterable[Mapping[str, Property]]) -> float | None:
+    """Of all that are waveforms; None where they are of several rates."""
+    periods = {one["wf_increment"] for one in said if "wf_increment" in one}
+    period = periods.pop() if len(periods) == 1 else None
+    return period if isinstance(period, float) and period > 0 else None
 
 
 def _metadata(objects: dict[str, _Channel], held: list[_Channel]) -> dict[str, float | str]:
     of_file = objects["/"].properties if "/" in objects else {}
-    known: dict[str, float | str] = {name: value for name, value in of_file.items() if value is not None}
+    known: dict[str, float | str] = {name: value for name, value in of_file.items() if not isinstance(value, _Stamp)}
     periods = {channel.properties.get("wf_increment") for channel in held}
     period = periods.pop() if len(periods) == 1 else None
     return known | ({"sample_period_s": period} if isinstance(period, float) and period > 0 else {})
@@ -180,8 +216,8 @@ def _property(part: Stretch, order: str) -> Property:
     if kind == _TEXT:
         return _text(part, order)
     if kind == _TIME_STAMP:
-        part.take(16)
-        return None
+        seconds, parts = part.read(order + "qQ") if order == ">" else reversed(part.read(order + "Qq"))
+        return _Stamp(seconds, parts)
     if kind not in _TYPES:
         part.refuse(f"a property of type {kind:#x}")
     dtype = np.dtype(order + _TYPES[kind])

@@ -24,6 +24,8 @@ DATES = ((32874.0, 73051.0), (7.2e5, 7.7e5))
 """Days of the years 1990 to 2099 as Excel counts them, and of 1971 to 2108 as MATLAB does."""
 LEAST_STEP_S = 1e-6
 SAME_INTERVAL = 0.02
+LEAST_BACK = 16
+"""Rows by which a time must go back to begin again: less is a row out of its place."""
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
 
@@ -108,6 +110,22 @@ def from_days(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[Re
     return {**columns, "time_s": DAY_S * (time - np.floor(time[0]))}, [note]
 
 
+def require_one_block(columns: Mapping[str, Signal], source: str) -> None:
+    """DataRefused: the time begins again inside a segment, where another recording stands below the first."""
+    time = columns["time_s"]
+    steps, segment = np.diff(time), columns.get("segment", np.zeros(time.size))
+    if steps.size < LEAST_ROWS:
+        return
+    again = np.flatnonzero((steps < -LEAST_BACK * np.median(np.abs(steps))) & (np.diff(segment) == 0.0)) + 1
+    if again.size:
+        row = int(again[0])
+        raise DataRefused(
+            f"{source}: the time begins again in row {row + 1} of its numbers: {again.size + 1} recordings stand below each other",
+            step="read the time", value=f"from {time[row - 1]:.6g} s back to {time[row]:.6g} s", limit="a time that runs on",
+            remedy="save each in a file of its own; at standstill a column segment may number them",
+        )  # fmt: skip
+
+
 def with_running_time(
     columns: Mapping[str, Signal], clock: Clock, source: str
 ) -> tuple[dict[str, Signal], list[ReadingNote]]:
@@ -154,6 +172,16 @@ def against_interval(
             limit=f"{interval:.6g} s", remedy="name the unit of the time behind its name, as Time (ms)",
         )  # fmt: skip
     return [ReadingNote("interval", f"{said}: the stamps are used")]
+
+
+def without_empty_columns(
+    columns: Mapping[str, Signal], readings: Sequence[ColumnReading]
+) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns without those that mean something and in which no cell is a number."""
+    called = {r.meaning: r.name for r in readings if r.meaning}
+    empty = [name for name, v in columns.items() if name in called and v.size and not np.isfinite(v).any()]
+    notes = [ReadingNote("no_number", f"no cell of {called[name]} is a number: not used") for name in empty]
+    return {name: v for name, v in columns.items() if name not in empty}, notes
 
 
 def without_doubled_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:

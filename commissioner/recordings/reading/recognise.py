@@ -24,7 +24,7 @@ from commissioner.recordings.names import (
 )
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.reading.said_tests import is_title
-from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns, sheet_unit
+from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns, sheet_unit, winding_columns
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
 from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in, without_brackets
 from commissioner.records import ReadingNote, Signal
@@ -56,7 +56,7 @@ def recognise(
     meant = in_company(names)
     with_s = uses_rst([n for n in meant.values() if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
-    of_points = sheet_columns(names) if of_sheet else {}
+    of_points = sheet_columns(names) if of_sheet else winding_columns(names)
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
     meaning: str | None
@@ -120,10 +120,11 @@ def _own_unit(name: str) -> str:
 def windings_said(metadata: Mapping[str, float | str], source: str) -> dict[str, float | str]:
     """What lines above a test sheet say of the windings (`# R_uv (mOhm): 1520`, `# Schaltung: Dreieck`), by the contract's names, in ohm."""
     out: dict[str, float | str] = {}
+    windings = winding_columns(metadata)
     for name, value in metadata.items():
         if key_of_plate(name) == "connection":
             out["connection"] = value
-        meaning, said = resistance_meaning(name), _QUANTITY.fullmatch(str(value).strip())
+        meaning, said = windings.get(name) or resistance_meaning(name), _QUANTITY.fullmatch(str(value).strip())
         if meaning is None or said is None or name in CONTRACT_COLUMNS:
             continue
         unit = said[2] or unit_of(name) or sheet_unit(name)

@@ -132,9 +132,9 @@ def tdms(path, channels, of_group=()):
     def said(properties):
         out = struct.pack("<I", len(properties))
         for name, value in properties:
-            out += text(name) + (
-                struct.pack("<I", 0x20) + text(value) if isinstance(value, str) else struct.pack("<Id", 10, value)
-            )
+            kinds = {str: (0x20, text), float: (10, lambda v: struct.pack("<d", v)), bytes: (0x44, bytes)}
+            kind, packed = kinds[type(value)]
+            out += text(name) + struct.pack("<I", kind) + packed(value)
         return out
 
     body = struct.pack("<I", len(channels) + 1) + text("/'Data'") + struct.pack("<I", 0xFFFFFFFF) + said(of_group)
@@ -157,6 +157,61 @@ def test_a_tdms_file_by_any_of_its_properties(tmp_path, status, of_group):
         unit = [("NI_UnitDescription", MILLI[name.split("_")[0]])]
         channels.append((name, factor * MEANT[name], unit + ([] if of_group else scaling)))
     assert_same(tdms(tmp_path / "a.tdms", channels, scaling if of_group else []))
+
+
+def stamp(seconds, parts=0.0):
+    """As LabVIEW writes it: 2^-64 s, and seconds since 1904."""
+    return struct.pack("<Qq", int(parts * 2**64), 3_860_000_000 + seconds)
+
+
+def late_tdms(path, later, said_late, said_early):
+    """`current_u_a` begins `later` samples after the others, and is as much shorter."""
+    channels = []
+    for name in SIGNALS:
+        is_late = name == "current_u_a"
+        begin = said_late if is_late else said_early
+        channels.append((name, MEANT[name][later if is_late else 0 :], [("wf_increment", STEP), *begin]))
+    return tdms(path, channels)
+
+
+BEGINS = {
+    "stamp": ([("wf_start_time", stamp(1, 0.1 + 7 * STEP))], [("wf_start_time", stamp(1, 0.1))]),
+    "second": ([("wf_start_time", stamp(2, 7 * STEP - 0.0005))], [("wf_start_time", stamp(1, 0.9995))]),
+    "offset": ([("wf_start_offset", 7 * STEP)], [("wf_start_offset", 0.0)]),
+    "both": ([("wf_start_time", stamp(5)), ("wf_start_offset", 7 * STEP)], [("wf_start_time", stamp(5))]),
+}
+
+
+@pytest.mark.parametrize("said", BEGINS.values(), ids=BEGINS)
+def test_channels_of_a_tdms_file_that_begin_at_different_times_are_laid_together(tmp_path, said):
+    table = contract_table(late_tdms(tmp_path / "a.tdms", 7, *said))
+    assert "current_u_a begins 7 samples" in next(note.what for note in table.notes if note.code == "begins")
+    for name in SIGNALS:
+        np.testing.assert_allclose(table.columns[name], MEANT[name][7:], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("late", "early", "match"),
+    [
+        ([("wf_start_offset", 7.3 * STEP)], [], "part of a sample apart"),
+        ([("wf_start_offset", 1e3)], [], "no time in common"),
+        ([("wf_start_offset", 1e308)], [], "no time in common"),
+    ],
+)
+def test_channels_of_a_tdms_file_that_cannot_be_laid_together_are_refused(tmp_path, late, early, match):
+    with pytest.raises(DataRefused, match=match):
+        contract_table(late_tdms(tmp_path / "a.tdms", 0, late, early))
+
+
+def test_a_begin_of_a_tdms_channel_that_is_not_told_is_asked_for_where_others_differ(tmp_path):
+    at = [("wf_start_time", stamp(5))]
+    assert_same(late_tdms(tmp_path / "a.tdms", 0, [], at))
+    assert_same(late_tdms(tmp_path / "a.tdms", 0, [("wf_start_offset", float("nan"))], []))
+    channels = [(name, MEANT[name], [("wf_increment", STEP), *at]) for name in SIGNALS]
+    channels[0][2][1:] = []
+    channels[1][2].append(("wf_start_offset", STEP))
+    with pytest.raises(DataRefused, match=r"when Data\.current_u_a begins is not told"):
+        contract_table(tdms(tmp_path / "a.tdms", channels))
 
 
 @pytest.mark.parametrize(("digits", "unit"), [("000000", 1e6), ("000000000", 1e9)])

@@ -38,7 +38,7 @@ def test_a_linear_conversion_of_an_integer_channel_is_carried_out():
 
 
 def test_tdms_keeps_the_files_own_properties():
-    _, metadata = tdms.channels(DATA / "logger.tdms")
+    _, metadata, _ = tdms.channels(DATA / "logger.tdms")
     assert metadata["operator"] == "x" and metadata["rated"] == 2.0
 
 

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
+from commissioner.monitor.partial import Partial, without_plate
 from commissioner.recordings.imported import understand
-from commissioner.recordings.importers import read_running
-from commissioner.recordings.table import Table, to_standstill
+from commissioner.recordings.importers import contract_table, has_currents_only, read_running
+from commissioner.recordings.reading.mend import require_one_block
+from commissioner.recordings.table import Table, to_currents, to_standstill
+from commissioner.records import UNUSED_VOLTAGE
 
 NAMES = "Time (s),Ia (A),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)"
 STEP_S = 5e-4
@@ -39,6 +42,29 @@ def test_header_lines_among_the_countare_left_out(tmp_path, header):
     recording, codes = read(written(tmp_path, [*header, *body[:250], *header, *body[250:]]))
     assert codes == {"header_again"} and recording.sample_period_s == pytest.approx(STEP_S)
     np.testing.assert_allclose(recording.currents_a[0], SIGNALS[0], atol=1e-4)
+
+
+@pytest.mark.parametrize("between", [[], [",,,,,,"], [NAMES], ["", NAMES]])
+@pytest.mark.parametrize(
+    "first", [NAMES, "time_s,current_u_a,current_v_a,current_w_a,voltage_u_v,voltage_v_v,voltage_w_v"]
+)
+def test_a_second_recording_below_the_first_is_refused(tmp_path, between, first):
+    between = [first if line == NAMES else line for line in between]
+    with pytest.raises(DataRefused, match=r"begins again in row 601 of its numbers: 2 recordings") as refusal:
+        read_running(written(tmp_path, [first, *rows(), *between, *rows()[:300]]))
+    assert refusal.value.value == "from 0.2995 s back to 0 s" and "a file of its own" in refusal.value.remedy
+
+
+def test_a_second_recording_that_goes_on_in_time_belongs_to_the_first(tmp_path):
+    later = [f"{t + 0.3:.4f}" for t in TIME]
+    assert read_running(written(tmp_path, [NAMES, *rows(), NAMES, *rows(later)])).time_s.size == 1200
+
+
+def test_a_time_that_begins_again_in_each_segment_is_read():
+    columns = {"time_s": np.tile(TIME, 2), "current_u_a": np.tile(SIGNALS[0], 2), "segment": np.repeat([0.0, 1.0], 600)}
+    require_one_block(columns, "x")
+    with pytest.raises(DataRefused, match="begins again"):
+        require_one_block({**columns, "segment": np.zeros(1200)}, "x")
 
 
 def test_header_lines_do_not_count_where_the_countmake_the_time(tmp_path):
@@ -125,3 +151,27 @@ def test_a_link_without_voltage_is_no_drives(volts):
     table = Table(columns | {"time_s": np.arange(count) * 2e-4, "dc_link_v": np.full(count, volts)}, {}, "x.csv")
     with pytest.raises(DataRefused, match="dc_link_v is no DC link's voltage"):
         to_standstill(table)
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "said"),
+    [
+        ("Va (V),Vb (V),Vc (V)", "n/a", "from Va (V), Vb (V), Vc (V): no numbers"),
+        ("Spg. links (V),Spg. Mitte (V),Spg. rechts (V)", "1.5", "Spg. rechts (V): not named by a phase"),
+    ],
+)
+def test_voltages_that_could_not_be_read_are_named(tmp_path, names, values, said):
+    head = NAMES.replace("Va (V),Vb (V),Vc (V)", names)
+    currents = [row.split(",")[1:4] for row in rows()] * 4
+    lines = [",".join([f"{k * STEP_S:.4f}", *cells, *[values] * 3]) for k, cells in enumerate(currents)]
+    table = contract_table(written(tmp_path, [head, *lines]))
+    assert has_currents_only(table) and said in next(n.what for n in table.notes if n.code == UNUSED_VOLTAGE)
+    seen = without_plate(to_currents(table))
+    assert isinstance(seen, Partial) and said in seen.withheld["power_w"]
+
+
+def test_a_voltage_without_numbers_is_named_where_the_others_do_not_suffice(tmp_path):
+    lines = [",".join([*row.split(",")[:6], "n/a"]) for row in rows()]
+    with pytest.raises(DataRefused, match="lacks three phase voltages") as refusal:
+        read_running(written(tmp_path, [NAMES, *lines]))
+    assert "no cell of Vc (V) is a number" in refusal.value.value

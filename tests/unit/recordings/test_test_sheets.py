@@ -10,6 +10,7 @@ import pytest
 from commissioner.errors import DataRefused
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
+from commissioner.recordings.importers import contract_table
 from commissioner.recordings.sheet_names import resistance_meaning
 from commissioner.recordings.table import read_table
 
@@ -223,3 +224,88 @@ def test_no_load_with_single_phase_current_is_no_test(tmp_path: Path) -> None:
     path.write_text(SHEETS["contract"].replace("no_load", "no_load single phase"), encoding="utf-8")
     with pytest.raises(DataRefused, match="is called locked rotor and is no load by its inductance"):
         identify_any(IdentifyRequest((path,)))
+
+
+WINDINGS = "{above}test,f (Hz),U (V),I (A),P (W),{names}\nno-load,60,208,8.17,420,{values}\nlocked,15,25,27.9,920,,,\n"
+
+
+@pytest.mark.parametrize("connection", ["star", "delta"])
+@pytest.mark.parametrize(
+    "names", ["R_U (ohm),R_V (ohm),R_W (ohm)", "R L1 [Ω],R L2 [Ω],R L3 [Ω]", "Ra,Rb,Rc", "R_R_ohm,R_S_ohm,R_T_ohm"]
+)
+def test_of_three_windings_resistances_the_mean_is_taken(tmp_path: Path, names: str, connection: str) -> None:
+    path, factor = tmp_path / "sheet.csv", 1.0 if connection == "star" else 3.0
+    values = ",".join(f"{factor * ohm:.5f}" for ohm in (0.2416, 0.2429, 0.2442))
+    path.write_text(
+        WINDINGS.format(above=f"# connection: {connection}\n", names=names, values=values), encoding="utf-8"
+    )
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    assert done.document["parameters"]["stator_resistance_ohm"]["value"] == pytest.approx(0.2429, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("above", "values", "match", "value"),
+    [
+        (
+            "# connection: star\n",
+            "0.24,0.243,0.246",
+            "the windings' resistances differ",
+            "winding_resistance_w_ohm 0.246",
+        ),
+        ("", "0.2416,0.2429,0.2442", "in star or in delta", "in delta: 0.08097 ohm"),
+        ("", "0.2416,0.2429,0.2442", "in star or in delta", "in star: 0.2429 ohm"),
+    ],
+)
+def test_three_windings_that_differ_or_are_not_told_are_refused(
+    tmp_path: Path, above: str, values: str, match: str, value: str
+) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(WINDINGS.format(above=above, names="R_U (ohm),R_V (ohm),R_W (ohm)", values=values))
+    with pytest.raises(DataRefused, match=match) as refusal:
+        identify_any(IdentifyRequest((path,)))
+    assert value in str(refusal.value.value)
+
+
+def test_three_windings_above_a_sheet_and_beside_a_recording_are_no_volts(tmp_path: Path) -> None:
+    above = "# connection: star\n# R_U (mOhm): 241.6\n# R_V (mOhm): 242.9\n# R_W (mOhm): 244.2\n"
+    path = tmp_path / "sheet.csv"
+    path.write_text(
+        above + "\n".join(SHEETS["short"].replace(",winding_resistance_uv_ohm", "").replace(",0.4857", "").splitlines())
+    )
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    assert done.document["parameters"]["stator_resistance_ohm"]["value"] == pytest.approx(0.2429, rel=1e-4)
+    path.write_text("t (s),I (A),R_U (ohm),R_V (ohm),R_W (ohm)\n" + "".join(f"{k},1,2,2,2\n" for k in range(5)))
+    assert contract_table(path).columns["winding_resistance_v_ohm"][0] == 2.0
+
+
+def test_a_resistance_that_is_not_understood_is_named(tmp_path: Path) -> None:
+    path, sheet = tmp_path / "sheet.csv", SHEETS["short"].replace("winding_resistance_uv_ohm", "Odporność (ohm)")
+    path.write_text("# Résistance mystère: 1.3 ohm\n" + sheet, encoding="utf-8")
+    with pytest.raises(DataRefused, match="resistance is not given") as refusal:
+        identify_any(IdentifyRequest((path,)))
+    assert "Odporność (ohm)" in str(refusal.value.value) and "mystère" in str(refusal.value.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "meaning"),
+    [
+        ("Résistance d'enroulement par phase [Ω]", "winding_resistance_phase_ohm"),
+        ("Résistance de l’enroulement (mΩ)", "winding_resistance_ohm"),
+        ("Résistance par enroulement", "winding_resistance_phase_ohm"),
+        ("Résistance entre lignes", "winding_resistance_line_ohm"),
+        ("Resistencia del devanado por fase (Ω)", "winding_resistance_phase_ohm"),
+        ("Resistencia de los devanados", "winding_resistance_ohm"),
+        ("Resistencia por fase", "phase_resistance_ohm"),
+        ("Resistenza dell'avvolgimento per fase", "winding_resistance_phase_ohm"),
+        ("Resistenza degli avvolgimenti", "winding_resistance_ohm"),
+        ("Resistenza fra le fasi", "winding_resistance_line_ohm"),
+        ("Resistência do enrolamento por fase", "winding_resistance_phase_ohm"),
+        ("Resistência entre terminais", "winding_resistance_line_ohm"),
+        ("Widerstand je Strang", "winding_resistance_phase_ohm"),
+        ("R1 (Ohm)", "stator_resistance_ohm"),
+    ],
+)
+def test_a_resistance_says_in_any_language_where_it_was_measured(name: str, meaning: str) -> None:
+    assert resistance_meaning(name) == meaning
