@@ -13,6 +13,7 @@ from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.loads.mean_torque import whole_record_torque
 from commissioner.monitor.periods.periods import SHAFT_SIGNIFICANT, find_peaks_above, pair_spectrum, stands_out
+from commissioner.monitor.periods.steadiness import frequency_wander, too_little
 from commissioner.monitor.signals.supply import TurningFrame
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
@@ -203,3 +204,46 @@ def test_what_a_swinging_load_makes_of_the_mains_is_no_line_of_the_shaft(ahead):
     seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
     assert not isinstance(seen, Refused)
     assert abs(seen.mean_speed_rad_per_s - 2 * np.pi * shaft) < 3.0 * seen.mean_speed_std
+
+
+@pytest.mark.parametrize("swing_hz", [2.5, 3.3, 4.0])
+def test_a_start_into_a_swinging_load_ends_where_the_motor_runs(swing_hz):
+    """It was a start to the end of the recording: the current is never still."""
+    t = np.arange(400) * HOP_S
+    running = 7.5 * (1.0 + 0.1 * np.sin(2 * np.pi * swing_hz * t))
+    found = runs_of(np.where(t < 2.0, 45.0, np.interp(t, [2.0, 2.4], [45.0, 8.0]) * (t < 2.4) + running * (t >= 2.4)))
+    assert [s[0] for s in found] == ["start", "steady"]
+    assert found[0][2] == pytest.approx(2.4, abs=0.1)
+
+
+@pytest.mark.parametrize("to", [0.5, 1.5])
+def test_a_start_that_the_recording_ends_in_is_said(to):
+    """Its mean, 1.69 times the rated current, had been refused as outside 0.12 ... 3."""
+    t = np.arange(2000) * 1e-3
+    level = np.sqrt(2.0) * PLATE.rated_current_a * np.interp(t, [0.8, 2.0], [5.0, to])
+    waves = [np.cos(100 * np.pi * t - 2 * np.pi / 3 * k) for k in range(3)]
+    currents, volts = (tuple(a * w for w in waves) for a in (level, 326.6))
+    seen, _, stretches = in_its_states(RunningRecording(t, currents, volts, False, None, 1e-3), PLATE, Wishes())
+    assert [s["state"] for s in stretches] == ["start"]
+    assert "starts to the end" in seen.reason.what and "less than 2 times" in seen.reason.limit
+
+
+@pytest.mark.parametrize(
+    ("course", "said"),
+    [(lambda t: 30.0 - 0.1 * t, "ramps from 30 to 29.2 Hz"), (lambda t: 30.0 + 0.4 * np.sin(0.75 * t), "wanders between 29.6 and 30.4 Hz")],
+)  # fmt: skip
+def test_a_slow_ramp_is_told_from_a_wander(course, said):
+    t = np.arange(8001) * 1e-3
+    frame = SimpleNamespace(
+        time_s=t, voltage_v=np.full(t.size, 300.0 + 0j), supply_rad_per_s=2 * np.pi * course(t), sample_period_s=1e-3
+    )
+    finding = frequency_wander(frame, slice(0, t.size))
+    assert finding.stops and said in finding.what
+
+
+def test_a_load_that_wanders_is_given_no_period():
+    """A conveyor's: "only 1.4 load periods"."""
+    frame = SimpleNamespace(time_s=np.arange(2521) * 1e-3)
+    found = SimpleNamespace(shaft=SimpleNamespace(frequency_hz=24.0), loads=(SimpleNamespace(frequency_hz=0.55),))
+    said = too_little(frame, slice(0, 2521), found, None).what
+    assert "load period" not in said and "0.55 Hz" in said and "1.4 times into 2.52 s" in said
