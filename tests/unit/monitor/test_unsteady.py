@@ -12,9 +12,11 @@ from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.loads.mean_torque import whole_record_torque
+from commissioner.monitor.periods import combs
 from commissioner.monitor.periods.periods import SHAFT_SIGNIFICANT, find_peaks_above, pair_spectrum, stands_out
 from commissioner.monitor.periods.steadiness import frequency_wander, too_little
 from commissioner.monitor.signals.supply import TurningFrame
+from commissioner.monitor.signals.tracking import Demodulated, track
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
 from commissioner.operations.recordings.stretches import in_its_states, said_by_terminals
@@ -247,3 +249,37 @@ def test_a_load_that_wanders_is_given_no_period():
     found = SimpleNamespace(shaft=SimpleNamespace(frequency_hz=24.0), loads=(SimpleNamespace(frequency_hz=0.55),))
     said = too_little(frame, slice(0, 2521), found, None).what
     assert "load period" not in said and "0.55 Hz" in said and "1.4 times into 2.52 s" in said
+
+
+@pytest.mark.parametrize("cubic_rad", [0.0, 0.5])
+def test_what_the_blocks_scatter_by_is_no_drift_and_a_drift_that_is_kept_has_its_error(cubic_rad):
+    """64 blocks whose phase scatters by 0.1 rad where their neighbours' differences promise 0.02: chance had been kept as a cubic
+    drift, of which the mean speed was seven standard deviations off."""
+    time, draws = np.linspace(0.0, 6.3, 64), np.random.default_rng(9)
+    place = np.linspace(-1.0, 1.0, 64)
+    cubic = np.polynomial.legendre.Legendre([0.0, 0.0, 0.0, 1.0])(place)
+    rates = []
+    for _ in range(40):
+        phase = cubic_rad * cubic + 0.1 * draws.standard_normal(64)
+        drift = track(Demodulated(np.array([1]), np.exp(1j * phase)[None], time, np.array([2 * 0.02**2])), 4)
+        rates.append((drift.mean_rad_per_s, drift.mean_std_rad_per_s))
+    mean, std = np.transpose(rates)
+    assert np.all(np.abs(mean - cubic_rad / 3.15) <= 4.0 * std)
+    if cubic_rad:
+        assert np.std(mean) == pytest.approx(np.mean(std), rel=0.3)
+    else:
+        assert np.mean(mean == 0.0) > 0.95
+
+
+@pytest.mark.parametrize(("moved", "is_seen"), [(1.0, True), (1.1, False)])
+def test_a_shaft_that_leaves_the_slips_range_once_the_loads_are_told_apart_is_none(monkeypatch, moved, is_seen):
+    """A load's second line had been taken for it, and what was left was followed through noise to 12 % above synchronous speed."""
+    steady = recorded(lambda t: 0.02 + 0 * t, seconds=3.0)
+    turning = 1.0 + 0.004 * np.sin(2 * np.pi * 24.5 * steady.time_s)
+    again = combs._again
+    monkeypatch.setattr(combs, "_again", lambda *a: replace(again(*a), frequency_hz=moved * again(*a).frequency_hz))
+    seen, _, _ = in_its_states(
+        replace(steady, currents_a=tuple(turning * i for i in steady.currents_a)), PLATE, Wishes()
+    )
+    assert isinstance(seen, Refused) is not is_seen
+    assert is_seen or seen.reason.code == "no_shaft_line"
