@@ -108,11 +108,14 @@ def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
 
 
 def _watched(part: RunningRecording, plate: Nameplate, wishes: Wishes) -> Observation | Refused:
-    """As the chain sees it. Where only the terminals are left to tell a torque, the plate is asked without the shaft."""
+    """As the chain sees it. Where only the terminals are left to tell a torque, the plate is asked without the shaft; what contradicts it
+    is asked again with a shaft that is seen: a fault's currents have another power factor than the plate's motor at their slip."""
     seen = observe(part, plate, wishes)
     if isinstance(seen, Observation) or seen.reason.code not in SHORT | SILENT:
         return seen
     against, said = against_plate(seen.audited, None, plate), doubt_of(seen.audited, None, plate)
+    if against is not None and seen.shaft_hz is not None:
+        against, said = against_plate(seen.audited, seen.shaft_hz, plate), doubt_of(seen.audited, seen.shaft_hz, plate)
     if against is not None:
         if wishes.trust == "plate" and against.likely is not None:
             return observe(over_currents(part, against.likely), plate, replace(wishes, trust=None))

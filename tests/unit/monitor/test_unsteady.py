@@ -283,3 +283,19 @@ def test_a_shaft_that_leaves_the_slips_range_once_the_loads_are_told_apart_is_no
     )
     assert isinstance(seen, Refused) is not is_seen
     assert is_seen or seen.reason.code == "no_shaft_line"
+
+
+@pytest.mark.parametrize(
+    ("scale", "beside_a", "code"), [(1.0, 3.2, "too_few_periods"), (3**0.5, 0.0, "plate_contradiction")]
+)
+def test_a_fault_that_turns_the_power_factor_is_no_other_plate_where_the_shaft_is_seen(scale, beside_a, code):
+    """What a shorted loop draws beside the motor: 1.7 times the current at the power factor's slip, too little to matter at the shaft's."""
+    steady = recorded(lambda t: 0.03 + 0 * t)
+    t = steady.time_s
+    moved = 1.0 + 0.004 * np.sin(2 * np.pi * 24.25 * t) + 0.01 * np.sin(2 * np.pi * 0.82 * t)
+    currents = tuple(
+        scale * moved * i + beside_a * np.sqrt(2.0) * np.sin(100 * np.pi * t - 2 * np.pi / 3 * k)
+        for k, i in enumerate(steady.currents_a)
+    )
+    seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == code
