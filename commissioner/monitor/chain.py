@@ -81,11 +81,12 @@ class Observation:
 
 @dataclass(frozen=True)
 class Refused:
-    """No answer, with what was learned on the way."""
+    """No answer, with what was learned on the way; `shaft_hz` where the shaft was seen, and only the periods are too few."""
 
     audited: Audited
     reason: Finding
     findings: tuple[Finding, ...]
+    shaft_hz: float | None = None
 
 
 @dataclass(frozen=True)
@@ -127,16 +128,16 @@ def observe(
             return Refused(audited, order, (*audited.findings, order))
         if order is not None:
             return observe(recording, plate, wishes, order)
+    shaft_hz = found.shaft.frequency_hz if found.shaft and np.isfinite(found.shaft.frequency_std_hz) else None
     trouble = too_little(frame, part, found, search)
     if trouble is not None:
         trouble = volts_per_hertz(audited, plate) or trouble
-        return Refused(audited, trouble, (*audited.findings, trouble))
+        return Refused(audited, trouble, (*audited.findings, trouble), shaft_hz)
     poles = pole_count(found, found.spectrum, plate.pole_pairs, wishes.load_frequencies_hz)
     if poles is not None:
         audited = replace(audited, findings=(*audited.findings, poles))
         if poles.stops:
             return Refused(audited, poles, audited.findings)
-    shaft_hz = None if found.shaft is None else found.shaft.frequency_hz
     against, said = against_plate(audited, shaft_hz, plate), doubt_of(audited, shaft_hz, plate)
     if said is not None:
         audited = replace(audited, findings=(*audited.findings, said))

@@ -80,7 +80,7 @@ def whole_stretch(recording: RunningRecording, findings: Findings) -> tuple[int,
         findings.add(
             "too_short" if not lost else "missing_samples",
             "refused",
-            f"{reason} {(high - low) * period:.4g} s without a break: too few load periods",
+            f"{reason} {(high - low) * period:.4g} s without a break: too short to tell a period",
             (high - low) * period,
             f"at least {SHORTEST_S:g} s, better 30-60 s",
             RECORD_LONGER,

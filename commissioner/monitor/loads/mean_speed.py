@@ -57,7 +57,9 @@ def whole_record_speed(
     demodulated = tracking.demodulate(rest + own[0], time, phase, orders, blocks)
     drift = tracking.track(demodulated, int(np.clip(length / 4, 2, 16)))
     std = float(np.hypot(std, SHIFT_KNOWN * (speed - ratio * mean_supply(frame, everything))))
-    return speed + drift.mean_rad_per_s, float(np.hypot(std, DRIFT_KNOWN * drift.mean_rad_per_s))
+    return speed + drift.mean_rad_per_s, float(
+        np.linalg.norm([std, DRIFT_KNOWN * drift.mean_rad_per_s, drift.mean_std_rad_per_s])
+    )
 
 
 def _beyond(frame: TurningFrame, part: slice, slip_rad: Signal) -> Signal:

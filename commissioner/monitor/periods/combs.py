@@ -67,7 +67,15 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
             for n, o in zip(known, before, strict=True)
         ):
             break
-    return Found(shaft and known[0], tuple(known[1:] if shaft else known), spectrum, left, candidates)
+    loads = tuple(known[1:] if shaft else known)
+    return Found(known[0] if shaft and _is_inside(known[0], search) else None, loads, spectrum, left, candidates)
+
+
+def _is_inside(shaft: Periodicity, search: ShaftSearch) -> bool:
+    """Within the slip's range, as far as its frequency is known. A line that was another's leaves it once that one is told apart."""
+    low, high = periods.range_hz(search)
+    beside = OUTSIDE_SIGMA * shaft.frequency_std_hz
+    return low - beside <= shaft.frequency_hz <= high + beside
 
 
 def told_apart(frame: TurningFrame, part: slice, known: list[Periodicity]) -> tuple[Vector, list[Vector]]:
@@ -93,7 +101,6 @@ def _find_shaft(
     not a slower load's."""
     candidates = periods.shaft_candidates(spectrum, search, periods.search_harmonics(frame.band_hz, search))
     table = tuple((f, score) for f, score, _ in candidates)
-    low, high = periods.range_hz(search)
     for frequency, _, visible in candidates:
         seen = tuple(h for h in visible if _is_own_line(spectrum, h * frequency, 2 * search.supply_hz, frequency))
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
@@ -101,9 +108,7 @@ def _find_shaft(
             break
         top = periods.top_of_line(spectrum, frequency, seen)
         shaft = _refined(frame, part, residual, spectrum, "shaft", top, seen)
-        beside = OUTSIDE_SIGMA * shaft.frequency_std_hz
-        is_inside = low - beside <= shaft.frequency_hz <= high + beside
-        if is_inside and any(periods.stands_out(spectrum, h * shaft.frequency_hz) for h in seen):
+        if _is_inside(shaft, search) and any(periods.stands_out(spectrum, h * shaft.frequency_hz) for h in seen):
             return shaft, table
     return None, table
 
@@ -148,7 +153,7 @@ def _refined(
     phase = comb_phase(frame, part, frequency, follows)
     drift = tracking.track(tracking.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
     shift = drift.mean_rad_per_s / (2 * np.pi)
-    std = float(np.hypot(std, DRIFT_KNOWN * shift))
+    std = float(np.linalg.norm([std, DRIFT_KNOWN * shift, drift.mean_std_rad_per_s / (2 * np.pi)]))
     return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean())
 
 

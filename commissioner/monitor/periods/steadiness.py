@@ -9,6 +9,7 @@ from commissioner.monitor.periods import periods
 from commissioner.monitor.periods.combs import Found
 from commissioner.monitor.periods.periods import ShaftSearch
 from commissioner.monitor.signals.supply import TurningFrame
+from commissioner.records import Signal
 
 LARGEST_FREQUENCY_WANDER = 0.004
 """Of the mean, within the stretch analysed: the grid's own drift is ten times smaller."""
@@ -17,6 +18,8 @@ LARGEST_SWING_RAD = 0.03
 tenth of it. Beyond it the supply's own frequency pulses, and what repeats in the speed is the supply's.
 """
 SWING_BAND_HZ = 15.0
+RAMP = 0.9
+"""Of all that the frequency moves, from which on, end to end, it ramps."""
 LEAST_TURNS = 30
 LEAST_LOAD_PERIODS = 8
 
@@ -35,16 +38,24 @@ def frequency_wander(frame: TurningFrame, part: slice) -> Finding:
         )
     frequency = frame.supply_rad_per_s[part]
     share = float(np.ptp(frequency) / frequency.mean())
-    kind = "refused" if share > LARGEST_FREQUENCY_WANDER else "note"
+    is_steady = share <= LARGEST_FREQUENCY_WANDER
+    moved = f"moves by {share:.2%}" if is_steady else _course(frequency / (2 * np.pi))
     return Finding(
         "frequency_wander",
-        kind,
-        f"the supply frequency moves by {share:.2%} within the quietest stretch: "
-        + ("the motor is not in a steady state" if kind == "refused" else "steady"),
+        "note" if is_steady else "refused",
+        f"the supply frequency {moved} within the quietest stretch: "
+        + ("steady" if is_steady else "the motor is not in a steady state"),
         share,
         LARGEST_FREQUENCY_WANDER,
         "record at a steady set point",
     )
+
+
+def _course(hertz: Signal) -> str:
+    first, last, span = float(hertz[0]), float(hertz[-1]), float(np.ptp(hertz))
+    if abs(last - first) > RAMP * span:
+        return f"ramps from {first:.4g} to {last:.4g} Hz"
+    return f"wanders between {hertz.min():.4g} and {hertz.max():.4g} Hz"
 
 
 def _swing(frame: TurningFrame, part: slice) -> float:
@@ -75,7 +86,7 @@ def too_little(frame: TurningFrame, part: slice, found: Found, search: ShaftSear
         return Finding(
             "too_few_periods",
             "refused",
-            f"only {turns:.1f} load periods in {length:.2f} s",
+            f"{slowest:.2g} Hz, the slowest line of the currents, fits {turns:.1f} times into {length:.2f} s: too few to tell a period",
             turns,
             float(least),
             "record 30-60 s at steady load",

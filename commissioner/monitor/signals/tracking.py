@@ -5,7 +5,7 @@ Block sums of the demodulated current hold all that is needed: any small change 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,11 +93,13 @@ def _frequency_std(demodulated: Demodulated, centre: Signal, shift: float) -> fl
 
 @dataclass(frozen=True)
 class PhaseDrift:
-    """What a comb's fundamental phase did beyond its nominal one: a polynomial in time scaled to -1 ... 1, constant outside."""
+    """What a comb's fundamental phase did beyond its nominal one: a polynomial in time scaled to -1 ... 1, constant outside.
+    `mean_std_rad_per_s`: of its mean rate, by the scatter of the blocks."""
 
     polynomial: NDArray[np.float64]
     centre_s: float
     half_s: float
+    mean_std_rad_per_s: float = 0.0
 
     def __call__(self, time_s: Signal) -> Signal:
         place = np.clip((time_s - self.centre_s) / self.half_s, -1.0, 1.0)
@@ -112,13 +114,14 @@ class PhaseDrift:
         """The same without its mean rate: it ends as it began."""
         polynomial = self.polynomial.copy()
         polynomial[1] -= np.sum(polynomial[1::2])
-        return PhaseDrift(polynomial, self.centre_s, self.half_s)
+        return replace(self, polynomial=polynomial)
 
 
 def track(demodulated: Demodulated, degree: int) -> PhaseDrift:
     """The smooth phase that the comb's blocks show together: delta_b = sum h Im(z_b conj c) / sum h^2 |c|^2, iterated.
 
-    Harmonics are weighed by their noise; coefficients below three standard deviations are dropped.
+    Harmonics are weighed by their noise; coefficients below three standard deviations are dropped: those of that noise, or, where
+    the blocks scatter more, of their scatter.
     """
     time = demodulated.time_s
     centre, half = 0.5 * (time[0] + time[-1]), 0.5 * np.ptp(time)
@@ -132,7 +135,8 @@ def track(demodulated: Demodulated, degree: int) -> PhaseDrift:
         bottom = np.sum(h**2 * np.abs(mean) ** 2 * weight)
         delta = np.sum(h * weight * np.imag(turned * np.conj(mean)), axis=0) / max(bottom, 1e-300)
         coefficients = coefficients + np.linalg.lstsq(basis, delta, rcond=None)[0]
-    std = np.sqrt(0.5 / max(bottom, 1e-300)) / np.sqrt(np.sum(basis**2, axis=0))
+    std = max(np.sqrt(0.5 / max(bottom, 1e-300)), np.std(delta)) / np.sqrt(np.sum(basis**2, axis=0))
     coefficients = np.where(np.abs(coefficients) > 3 * std, coefficients, 0.0)
     coefficients[0] = 0.0
-    return PhaseDrift(coefficients, float(centre), float(half))
+    kept = np.where(coefficients != 0.0, std, 0.0)
+    return PhaseDrift(coefficients, float(centre), float(half), float(np.linalg.norm(kept[1::2])) / float(half))

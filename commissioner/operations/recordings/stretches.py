@@ -13,7 +13,7 @@ from commissioner.monitor.intake.against_plate import against_plate, doubt_of, o
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.channels import Wiring, is_straight_motor
 from commissioner.monitor.intake.findings import Audited, Finding
-from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
+from commissioner.monitor.intake.states.naming import LEAST_STEADY_S, START_CURRENT
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals, power_wander_w
 from commissioner.monitor.loads.pairing_by_start import wired_in
@@ -92,11 +92,13 @@ def _wired(recording: RunningRecording, stretches: tuple[Stretch, ...], plate: N
 
 
 def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
-    """A current that is a start's all along may as well be another unit's."""
+    """A current that is a start's to the end of the recording may as well be another unit's."""
     if {s.state for s in stretches} == {"start"}:
         share = stretches[-1].current_a / plate.rated_current_a
         return Finding(
-            "current_level", "refused", f"the currents are {share:.3g} times the rated one all along", share, f"{LEAST_CURRENT:g} ... {LARGEST_CURRENT:g}",
+            "current_level", "refused",
+            f"the motor starts to the end of the recording, or the currents are in another unit: {share:.3g} times the rated one on the mean",
+            share, f"settled at less than {START_CURRENT:g} times the rated current for {LEAST_STEADY_S:g} s",
             "give the currents in ampere (probe factor, mA?), or correct the plate; of a motor that starts so long, record until it runs",
         )  # fmt: skip
     return Finding(
@@ -106,11 +108,14 @@ def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
 
 
 def _watched(part: RunningRecording, plate: Nameplate, wishes: Wishes) -> Observation | Refused:
-    """As the chain sees it. Where only the terminals are left to tell a torque, the plate is asked without the shaft."""
+    """As the chain sees it. Where only the terminals are left to tell a torque, the plate is asked without the shaft; what contradicts it
+    is asked again with a shaft that is seen: a fault's currents have another power factor than the plate's motor at their slip."""
     seen = observe(part, plate, wishes)
     if isinstance(seen, Observation) or seen.reason.code not in SHORT | SILENT:
         return seen
     against, said = against_plate(seen.audited, None, plate), doubt_of(seen.audited, None, plate)
+    if against is not None and seen.shaft_hz is not None:
+        against, said = against_plate(seen.audited, seen.shaft_hz, plate), doubt_of(seen.audited, seen.shaft_hz, plate)
     if against is not None:
         if wishes.trust == "plate" and against.likely is not None:
             return observe(over_currents(part, against.likely), plate, replace(wishes, trust=None))

@@ -98,7 +98,7 @@ def test_steady_stretches_under_two_seconds_have_torque_and_speed(file, torque_n
     document = done.document
     for key, true in (("mean_torque_nm", torque_nm), ("mean_speed_rad_per_s", speed)):
         assert document[key]["value"] == pytest.approx(true, abs=2 * document[key]["std"])
-    assert "too few load periods" in document["withheld"]["parameters"]
+    assert "too short to tell a period" in document["withheld"]["parameters"]
     assert unused in document["withheld"]["from other states"]
     assert [s["used"] for s in document["states"]].count(True) == 1
 

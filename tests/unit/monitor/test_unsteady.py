@@ -12,8 +12,11 @@ from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.loads.mean_torque import whole_record_torque
+from commissioner.monitor.periods import combs
 from commissioner.monitor.periods.periods import SHAFT_SIGNIFICANT, find_peaks_above, pair_spectrum, stands_out
+from commissioner.monitor.periods.steadiness import frequency_wander, too_little
 from commissioner.monitor.signals.supply import TurningFrame
+from commissioner.monitor.signals.tracking import Demodulated, track
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
 from commissioner.operations.recordings.stretches import in_its_states, said_by_terminals
@@ -203,3 +206,96 @@ def test_what_a_swinging_load_makes_of_the_mains_is_no_line_of_the_shaft(ahead):
     seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
     assert not isinstance(seen, Refused)
     assert abs(seen.mean_speed_rad_per_s - 2 * np.pi * shaft) < 3.0 * seen.mean_speed_std
+
+
+@pytest.mark.parametrize("swing_hz", [2.5, 3.3, 4.0])
+def test_a_start_into_a_swinging_load_ends_where_the_motor_runs(swing_hz):
+    """It was a start to the end of the recording: the current is never still."""
+    t = np.arange(400) * HOP_S
+    running = 7.5 * (1.0 + 0.1 * np.sin(2 * np.pi * swing_hz * t))
+    found = runs_of(np.where(t < 2.0, 45.0, np.interp(t, [2.0, 2.4], [45.0, 8.0]) * (t < 2.4) + running * (t >= 2.4)))
+    assert [s[0] for s in found] == ["start", "steady"]
+    assert found[0][2] == pytest.approx(2.4, abs=0.1)
+
+
+@pytest.mark.parametrize("to", [0.5, 1.5])
+def test_a_start_that_the_recording_ends_in_is_said(to):
+    """Its mean, 1.69 times the rated current, had been refused as outside 0.12 ... 3."""
+    t = np.arange(2000) * 1e-3
+    level = np.sqrt(2.0) * PLATE.rated_current_a * np.interp(t, [0.8, 2.0], [5.0, to])
+    waves = [np.cos(100 * np.pi * t - 2 * np.pi / 3 * k) for k in range(3)]
+    currents, volts = (tuple(a * w for w in waves) for a in (level, 326.6))
+    seen, _, stretches = in_its_states(RunningRecording(t, currents, volts, False, None, 1e-3), PLATE, Wishes())
+    assert [s["state"] for s in stretches] == ["start"]
+    assert "starts to the end" in seen.reason.what and "less than 2 times" in seen.reason.limit
+
+
+@pytest.mark.parametrize(
+    ("course", "said"),
+    [(lambda t: 30.0 - 0.1 * t, "ramps from 30 to 29.2 Hz"), (lambda t: 30.0 + 0.4 * np.sin(0.75 * t), "wanders between 29.6 and 30.4 Hz")],
+)  # fmt: skip
+def test_a_slow_ramp_is_told_from_a_wander(course, said):
+    t = np.arange(8001) * 1e-3
+    frame = SimpleNamespace(
+        time_s=t, voltage_v=np.full(t.size, 300.0 + 0j), supply_rad_per_s=2 * np.pi * course(t), sample_period_s=1e-3
+    )
+    finding = frequency_wander(frame, slice(0, t.size))
+    assert finding.stops and said in finding.what
+
+
+def test_a_load_that_wanders_is_given_no_period():
+    """A conveyor's: "only 1.4 load periods"."""
+    frame = SimpleNamespace(time_s=np.arange(2521) * 1e-3)
+    found = SimpleNamespace(shaft=SimpleNamespace(frequency_hz=24.0), loads=(SimpleNamespace(frequency_hz=0.55),))
+    said = too_little(frame, slice(0, 2521), found, None).what
+    assert "load period" not in said and "0.55 Hz" in said and "1.4 times into 2.52 s" in said
+
+
+@pytest.mark.parametrize("cubic_rad", [0.0, 0.5])
+def test_what_the_blocks_scatter_by_is_no_drift_and_a_drift_that_is_kept_has_its_error(cubic_rad):
+    """64 blocks whose phase scatters by 0.1 rad where their neighbours' differences promise 0.02: chance had been kept as a cubic
+    drift, of which the mean speed was seven standard deviations off."""
+    time, draws = np.linspace(0.0, 6.3, 64), np.random.default_rng(9)
+    place = np.linspace(-1.0, 1.0, 64)
+    cubic = np.polynomial.legendre.Legendre([0.0, 0.0, 0.0, 1.0])(place)
+    rates = []
+    for _ in range(40):
+        phase = cubic_rad * cubic + 0.1 * draws.standard_normal(64)
+        drift = track(Demodulated(np.array([1]), np.exp(1j * phase)[None], time, np.array([2 * 0.02**2])), 4)
+        rates.append((drift.mean_rad_per_s, drift.mean_std_rad_per_s))
+    mean, std = np.transpose(rates)
+    assert np.all(np.abs(mean - cubic_rad / 3.15) <= 4.0 * std)
+    if cubic_rad:
+        assert np.std(mean) == pytest.approx(np.mean(std), rel=0.3)
+    else:
+        assert np.mean(mean == 0.0) > 0.95
+
+
+@pytest.mark.parametrize(("moved", "is_seen"), [(1.0, True), (1.1, False)])
+def test_a_shaft_that_leaves_the_slips_range_once_the_loads_are_told_apart_is_none(monkeypatch, moved, is_seen):
+    """A load's second line had been taken for it, and what was left was followed through noise to 12 % above synchronous speed."""
+    steady = recorded(lambda t: 0.02 + 0 * t, seconds=3.0)
+    turning = 1.0 + 0.004 * np.sin(2 * np.pi * 24.5 * steady.time_s)
+    again = combs._again
+    monkeypatch.setattr(combs, "_again", lambda *a: replace(again(*a), frequency_hz=moved * again(*a).frequency_hz))
+    seen, _, _ = in_its_states(
+        replace(steady, currents_a=tuple(turning * i for i in steady.currents_a)), PLATE, Wishes()
+    )
+    assert isinstance(seen, Refused) is not is_seen
+    assert is_seen or seen.reason.code == "no_shaft_line"
+
+
+@pytest.mark.parametrize(
+    ("scale", "beside_a", "code"), [(1.0, 3.2, "too_few_periods"), (3**0.5, 0.0, "plate_contradiction")]
+)
+def test_a_fault_that_turns_the_power_factor_is_no_other_plate_where_the_shaft_is_seen(scale, beside_a, code):
+    """What a shorted loop draws beside the motor: 1.7 times the current at the power factor's slip, too little to matter at the shaft's."""
+    steady = recorded(lambda t: 0.03 + 0 * t)
+    t = steady.time_s
+    moved = 1.0 + 0.004 * np.sin(2 * np.pi * 24.25 * t) + 0.01 * np.sin(2 * np.pi * 0.82 * t)
+    currents = tuple(
+        scale * moved * i + beside_a * np.sqrt(2.0) * np.sin(100 * np.pi * t - 2 * np.pi / 3 * k)
+        for k, i in enumerate(steady.currents_a)
+    )
+    seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == code

@@ -124,7 +124,7 @@ def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a
     """The start at the head of an energised stretch, and steps of the level inside it."""
     current = levels.current_a[begin:end]
     later = float(np.median(current[current.size // 2 :]))
-    settled = 0
+    settled, again = 0, round(LEAST_STEADY_S / levels.hop_s)
     was_off = begin > 0 and names[begin - 1] in ("off", "residual", "coast-down")
     is_first = begin == 0 and float(current[:HOPS].max()) > START_CURRENT * rated_a
     if was_off or is_first:
@@ -133,13 +133,13 @@ def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a
         if current[peak] > START_CURRENT * rated_a or (
             above.size and above[0] <= 2 * HOPS and current[peak] > 1.5 * later
         ):
-            settled = _first_still(current, peak, START_CURRENT * rated_a)
+            settled = _first_still(current, peak, START_CURRENT * rated_a, again)
         else:
             settled = HOPS
         for k in range(begin, min(begin + settled, end)):
             names[k] = "start"
     elif begin > 0 and names[begin - 1] == "voltage dip":
-        settled = _first_still(current, 0, np.inf)
+        settled = _first_still(current, 0, np.inf, again)
         names[begin : begin + settled] = ["voltage dip"] * settled
     if end < len(names):
         # windows that reach over the switch-off: half of them lie before it
@@ -152,13 +152,18 @@ def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a
     _name_steps(levels, begin + settled, end, names)
 
 
-def _first_still(current: Signal, peak: int, below: float) -> int:
-    """From where behind the peak the level is lower than `below` and stays within a few per cent of what follows."""
+def _first_still(current: Signal, peak: int, below: float, again: int) -> int:
+    """From where behind the peak the level is lower than `below` and stays within a few per cent of what follows; where it swings, and
+    so does not for twice `again` windows, from where it is no higher than it comes `again` windows later or more."""
+    still = current.size
     for k in range(peak, current.size - HOPS):
         ahead = current[k : k + 3 * HOPS]
         if np.ptp(ahead) < SETTLED * np.median(ahead) < SETTLED * below:
-            return k
-    return current.size
+            still = k
+            break
+    highest_from = np.maximum.accumulate(current[::-1])[::-1]
+    back = peak + np.flatnonzero(current[peak:-again] <= np.minimum(highest_from[peak + again :], below))
+    return int(back[0]) if back.size and still - back[0] > 2 * again else still
 
 
 def _name_steps(levels: Levels, begin: int, end: int, names: list[str]) -> None:
