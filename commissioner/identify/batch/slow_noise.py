@@ -77,7 +77,7 @@ def widened(fit: BatchFit, segments: Sequence[Segment]) -> BatchFit:
     kept = sum(len(rows) for _, rows in sensitivities) / sum(x.current_a.size for x in segments)
     by_spectrum = kept * inverse @ (noise.white * normal + scattered) @ inverse / np.outer(scale, scale)
     by_spectrum = by_spectrum[: shared.size, : shared.size]
-    more = np.sqrt(np.maximum(np.diag(fit.covariance)[shared] / np.diag(by_spectrum), 1.0))
+    more = np.sqrt(np.maximum(np.diag(fit.covariance)[shared] / np.maximum(np.diag(by_spectrum), 1e-300), 1.0))
     covariance = np.zeros_like(fit.covariance)
     covariance[np.ix_(shared, shared)] = by_spectrum * np.outer(more, more)
     return replace(fit, covariance=covariance)
