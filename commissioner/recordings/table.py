@@ -34,6 +34,7 @@ from commissioner.records import (
     POINT_COLUMNS,
     POINT_FORMS,
     POINT_RESISTANCES,
+    UNUSED_VOLTAGE,
     ReadingNote,
     RunningRecording,
     Signal,
@@ -191,6 +192,14 @@ def to_standstill(table: Table) -> StandstillRecording:
             ", ".join([*columns, *table.metadata][:12]) or "no column",
             "time_s, currents and voltages; or frequency_hz, voltage_line_v, current_line_a, power_w; or rated values",
             "give what was measured, under these names (`commissioner docs formats`); a circuit's values alone are what `identify` would find",
+        )
+    if not any(name in ("segment", "axis_deg") or name.startswith("voltage_") for name in columns):
+        raise _refuse(
+            table.source,
+            "this recording holds no voltages: what a motor is cannot be told from its currents",
+            next((note.what for note in table.notes if note.code == UNUSED_VOLTAGE), ", ".join(columns)),
+            "time_s, currents and voltages; at standstill segment, axis_deg and voltage_axis_v",
+            "record the voltages as well, or name their columns (--map); `commissioner monitor` takes what currents alone tell",
         )
     _require(table, needed, "a standstill recording")
     optional = [name for name in ("current_w_a", "dc_link_v", "averaged_periods") if name in columns]

@@ -1,5 +1,7 @@
 """Rows of a text that are no samples, and stamps that do not tell rows apart: left out and said, or refused."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -175,3 +177,17 @@ def test_a_voltage_without_numbers_is_named_where_the_others_do_not_suffice(tmp_
     with pytest.raises(DataRefused, match="lacks three phase voltages") as refusal:
         read_running(written(tmp_path, [NAMES, *lines]))
     assert "no cell of Vc (V) is a number" in refusal.value.value
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [(NAMES, r"no voltages could be read from Va \(V\), Vb"), (NAMES.partition(",Va")[0], "current_w_a$")],
+)
+def test_parameters_of_currents_alone_are_refused_for_want_of_voltages(tmp_path, names, told):
+    lines = [
+        ",".join([stamp, *cells[:3], "n/a", "n/a", "n/a"][: names.count(",") + 1])
+        for stamp, *cells in (row.split(",") for row in rows())
+    ]
+    with pytest.raises(DataRefused, match="holds no voltages") as refused:
+        to_standstill(contract_table(written(tmp_path, [names, *lines])))
+    assert re.search(told, str(refused.value.value))
