@@ -122,15 +122,11 @@ class Problem:
 
     def sensitivities(self, theta: Matrix, own: Matrix) -> tuple[Matrix, list[tuple[NDArray[np.int64], Matrix]]]:
         """Information (total, total), and what it is the sum of: of each segment the numbers it depends on, and how (samples, numbers).
-        Of a record too long to keep them its segments' beginnings."""
-        width, samples = self.model.size + OWN, sum(s.current_a.size for s in self.segments)
-        share = min(1.0, MOST_KEPT / (width * samples))
-        begun = Problem([_beginning(s, share) for s in self.segments], self.period_s, self.model, is_coarse=True)
-        begun.plateau_v = self.plateau_v
-        information = begun.evaluate(theta, own, is_general=True).information
-        for rows in begun._rows:
-            rows[:, DELAY] /= self.period_s
-        return information, list(zip(begun.columns, begun._rows, strict=True))
+        Of `beginnings`."""
+        information = self.evaluate(theta, own, is_general=True).information
+        scale = np.ones(self.model.size + OWN)
+        scale[DELAY] = 1.0 / self.period_s
+        return information, [(columns, rows * scale) for columns, rows in zip(self.columns, self._rows, strict=True)]
 
     def evaluate(
         self,
@@ -270,13 +266,15 @@ class Problem:
         return [np.empty((s.current_a.size if self._keeps else ROWS, width)) for s in self.segments]
 
 
-def _beginning(segment: Segment, share: float) -> Segment:
-    """This share of its samples."""
-    if share >= 1.0:
-        return segment
-    n = max(int(share * segment.current_a.size), 1)
-    weight = None if segment.weight is None else segment.weight[:n]
-    return replace(segment, voltage_v=segment.voltage_v[:n], current_a=segment.current_a[:n], weight=weight)
+def beginnings(segments: Sequence[Segment], model: ModelChoice) -> Sequence[Segment]:
+    """The segments, of a record too long to keep its sensitivities the same share of each."""
+    share = MOST_KEPT / ((model.size + OWN) * sum(s.current_a.size for s in segments))
+    return segments if share >= 1.0 else [_beginning(s, max(int(share * s.current_a.size), 1)) for s in segments]
+
+
+def _beginning(segment: Segment, rows: int) -> Segment:
+    weight = None if segment.weight is None else segment.weight[:rows]
+    return replace(segment, voltage_v=segment.voltage_v[:rows], current_a=segment.current_a[:rows], weight=weight)
 
 
 def _from_zero(table: Matrix) -> Matrix:

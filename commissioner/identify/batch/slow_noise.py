@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.identify.batch.model import Matrix
-from commissioner.identify.batch.problem import Problem
+from commissioner.identify.batch.problem import Problem, beginnings
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.records import Signal
 
@@ -63,7 +63,7 @@ def widened(fit: BatchFit, segments: Sequence[Segment]) -> BatchFit:
     noise = slow_noise(fit.residuals, fit.sample_period_s)
     if noise is None:
         return fit
-    problem = Problem(segments, fit.sample_period_s, fit.model)
+    problem = Problem(beginnings(segments, fit.model), fit.sample_period_s, fit.model, is_coarse=True)
     problem.expect_leg(fit.theta)
     information, sensitivities = problem.sensitivities(fit.theta, fit.own)
     scores = np.zeros_like(information)

@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.monitor.machine.fit import Fitted
 from commissioner.monitor.machine.slow_slip import slip_phase
-from commissioner.monitor.periods.combs import DRIFT_KNOWN, Found, mean_supply, told_apart
+from commissioner.monitor.periods.combs import Found, mean_supply, told_apart
 from commissioner.monitor.periods.periods import Periodicity
 from commissioner.monitor.signals import tracking
 from commissioner.monitor.signals.averaging import Lines
@@ -57,9 +57,7 @@ def whole_record_speed(
     demodulated = tracking.demodulate(rest + own[0], time, phase, orders, blocks)
     drift = tracking.track(demodulated, int(np.clip(length / 4, 2, 16)))
     std = float(np.hypot(std, SHIFT_KNOWN * (speed - ratio * mean_supply(frame, everything))))
-    return speed + drift.mean_rad_per_s, float(
-        np.linalg.norm([std, DRIFT_KNOWN * drift.mean_rad_per_s, drift.mean_std_rad_per_s])
-    )
+    return speed + drift.mean_rad_per_s, float(np.hypot(std, drift.mean_error_rad_per_s))
 
 
 def _beyond(frame: TurningFrame, part: slice, slip_rad: Signal) -> Signal:

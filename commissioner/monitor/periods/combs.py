@@ -22,8 +22,6 @@ USED_FOR_REFINING = 4
 DRIFT_DEGREE = 4
 """A slip that wanders over the segment, as voltage and load do: phase polynomial beyond a fixed ratio to the mains (or to the
 clock), only as far as its coefficients stand out. Where it does, the frequency that captures most is not the mean one."""
-DRIFT_KNOWN = 0.1
-"""Relative error of the drift's mean: coefficients below three deviations were dropped."""
 MOST_AGAIN, STILL = 3, 0.3
 """How often lines are told apart anew, and the share of their standard errors within which their frequencies then stay."""
 OUTSIDE_SIGMA = 4.0
@@ -153,7 +151,7 @@ def _refined(
     phase = comb_phase(frame, part, frequency, follows)
     drift = tracking.track(tracking.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
     shift = drift.mean_rad_per_s / (2 * np.pi)
-    std = float(np.linalg.norm([std, DRIFT_KNOWN * shift, drift.mean_std_rad_per_s / (2 * np.pi)]))
+    std = float(np.hypot(std, drift.mean_error_rad_per_s / (2 * np.pi)))
     return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean())
 
 

@@ -91,6 +91,10 @@ def _frequency_std(demodulated: Demodulated, centre: Signal, shift: float) -> fl
     return float(1 / np.sqrt(information)) if information > 0 else float("inf")
 
 
+DRIFT_KNOWN = 0.1
+"""Relative error of the drift's mean: coefficients below three deviations were dropped."""
+
+
 @dataclass(frozen=True)
 class PhaseDrift:
     """What a comb's fundamental phase did beyond its nominal one: a polynomial in time scaled to -1 ... 1, constant outside.
@@ -109,6 +113,11 @@ class PhaseDrift:
     def mean_rad_per_s(self) -> float:
         """Mean rate from end to end."""
         return float(np.sum(self.polynomial[1::2]) / self.half_s)
+
+    @property
+    def mean_error_rad_per_s(self) -> float:
+        """Of the mean rate: `mean_std_rad_per_s` and what was dropped."""
+        return float(np.hypot(DRIFT_KNOWN * self.mean_rad_per_s, self.mean_std_rad_per_s))
 
     def without_mean(self) -> PhaseDrift:
         """The same without its mean rate: it ends as it began."""

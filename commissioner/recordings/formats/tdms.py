@@ -79,7 +79,8 @@ def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], tup
     several = {
         _name(key, channel): channel.properties for key, channel in held.items() if values[_name(key, channel)].size > 1
     }
-    values, notes = from_last_begin(values, _begins(several), _period(several.values()), str(path))
+    waveforms = [properties for properties in several.values() if "wf_increment" in properties]
+    values, notes = from_last_begin(values, _begins(several), _period(waveforms), str(path))
     return values, _metadata(objects, list(held.values())), notes
 
 
@@ -98,8 +99,8 @@ def _begins(said: Mapping[str, Mapping[str, Property]]) -> dict[str, float | Non
 
 
 def _period(said: Iterable[Mapping[str, Property]]) -> float | None:
-    """Of all that are waveforms; None where they are of several rates."""
-    periods = {one["wf_increment"] for one in said if "wf_increment" in one}
+    """None where they are of several rates, or one is no waveform."""
+    periods = {one.get("wf_increment") for one in said}
     period = periods.pop() if len(periods) == 1 else None
     return period if isinstance(period, float) and period > 0 else None
 
@@ -107,9 +108,8 @@ def _period(said: Iterable[Mapping[str, Property]]) -> float | None:
 def _metadata(objects: dict[str, _Channel], held: list[_Channel]) -> dict[str, float | str]:
     of_file = objects["/"].properties if "/" in objects else {}
     known: dict[str, float | str] = {name: value for name, value in of_file.items() if not isinstance(value, _Stamp)}
-    periods = {channel.properties.get("wf_increment") for channel in held}
-    period = periods.pop() if len(periods) == 1 else None
-    return known | ({"sample_period_s": period} if isinstance(period, float) and period > 0 else {})
+    period = _period(channel.properties for channel in held)
+    return known | ({"sample_period_s": period} if period is not None else {})
 
 
 def _segment(file: Stretch, objects: dict[str, _Channel], active: list[str]) -> list[str]:

@@ -4,7 +4,6 @@ import datetime as dt
 import struct
 
 import numpy as np
-import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -16,6 +15,7 @@ from commissioner.errors import DataRefused
 from commissioner.recordings.catalogue.reading import sheet_in
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.names import meanings_of
+from tests.unit.recordings.test_workbook import workbook
 
 ROWS, STEP = 40, 2e-4
 TIME = np.arange(ROWS) * STEP
@@ -235,17 +235,6 @@ def test_a_comtrade_of_2013_counts_nanoseconds_where_its_dates_do(tmp_path, digi
     assert any(note.code == "skew" for note in contract_table(tmp_path / "a.cfg").notes) == bool(skew)
 
 
-def book(path, **sheets):
-    made = openpyxl.Workbook()
-    made.remove(made.active)
-    for title, rows in sheets.items():
-        page = made.create_sheet(title)
-        for row in rows:
-            page.append(row)
-    made.save(path)
-    return path
-
-
 HEAD = [
     "t (s)",
     *(f"{name[0].replace('c', 'i')}_{name.split('_')[1].upper()} ({name[-1].upper()})" for name in SIGNALS),
@@ -258,9 +247,9 @@ def as_text(rows):
 
 
 def test_of_two_sheets_of_numbers_as_text_none_is_taken_in_silence(tmp_path):
-    assert_same(book(tmp_path / "one.xlsx", Data=as_text(TABLE), Cover=[["Motor", "17"]]))
+    assert_same(workbook(tmp_path / "one.xlsx", Data=as_text(TABLE), Cover=[["Motor", "17"]]))
     with pytest.raises(DataRefused, match="tables on several sheets"):
-        contract_table(book(tmp_path / "a.xlsx", Raw=as_text(TABLE), Data=as_text(TABLE)))
+        contract_table(workbook(tmp_path / "a.xlsx", Raw=as_text(TABLE), Data=as_text(TABLE)))
 
 
 @pytest.mark.parametrize("title", ["Date/Time", "Datum/Uhrzeit", "Fecha y hora", "Horodatage"])
@@ -269,7 +258,7 @@ def test_a_date_that_is_stored_as_days_is_a_time(tmp_path, title):
     begin = dt.datetime(2026, 5, 4, 10, 11, 12)
     serial = (begin - dt.datetime(1899, 12, 30)).total_seconds() / 86400
     rows = [[title, *HEAD[1:]], *([serial + row[0] / 86400, *row[1:]] for row in TABLE[1:])]
-    assert_same(book(tmp_path / "a.xlsx", Data=rows), coarse=1.5e-3)
+    assert_same(workbook(tmp_path / "a.xlsx", Data=rows), coarse=1.5e-3)
 
 
 def test_statistics_below_operating_points_are_no_points(tmp_path):
@@ -277,7 +266,7 @@ def test_statistics_below_operating_points_are_no_points(tmp_path):
         ["No.", "f (Hz)", "U (V)", "I (A)", "P (W)"],
         *([k, 50, 40 + 10 * k, 7.5 + 2 * k, 200 + 90 * k] for k in range(6)),
     ]
-    path = book(tmp_path / "a.xlsx", Data=[*rows, [], ["Mean", 50, 65, 12.5, 425], ["Max", 50, 90, 17.5, 650]])
+    path = workbook(tmp_path / "a.xlsx", Data=[*rows, [], ["Mean", 50, 65, 12.5, 425], ["Max", 50, 90, 17.5, 650]])
     assert contract_table(path).columns["voltage_line_v"].tolist() == [40, 50, 60, 70, 80, 90]
 
 
