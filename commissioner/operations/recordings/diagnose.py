@@ -31,7 +31,6 @@ from commissioner.operations.recordings.intake import (
     require_independent,
     require_one_motor,
     standstill,
-    without_copies,
 )
 from commissioner.operations.recordings.running import diagnosed
 from commissioner.operations.recordings.sheets import (
@@ -124,7 +123,7 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
 
     recordings, remarks = standstill(tables, request.motor)
     require_one_motor(recordings)
-    recordings, copies = without_copies(recordings)
+    require_independent(tables)
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
     is_computed = all(any(n.code == COMPUTED for n in r.notes) for r in recordings)
     phases = OWN_PHASES
@@ -136,7 +135,7 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
         cause["parameters"] = {_named_by(phases, key): value for key, value in cause["parameters"].items()}
     decided = _against_plate(document, {**recordings[0].metadata}, trust_from(request.trust))
     remarks = [*decided, *remarks]
-    document["audit"] = [*remarks, *copies, *document["audit"]]
+    document["audit"] = [*remarks, *document["audit"]]
     document["uncertain"] = uncertain(seen, withdrawn(seen.steps, {c.name for c in (*seen.causes, *seen.unsure)}))
     document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
     if request.out is not None:

@@ -40,7 +40,7 @@ from commissioner.operations.recordings.trust import (
 from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
-from commissioner.recordings.table import to_standstill
+from commissioner.recordings.table import Table, to_standstill
 from commissioner.recordings.whole import folder_to_write, write_texts
 from commissioner.records import StandstillRecording
 from commissioner.settings import load_motor, load_procedure
@@ -119,7 +119,7 @@ def identify_any(
     require_whole_sheets(tables)
     require_independent(tables)
     if not any(t.is_running for t in tables):
-        return identify(request, observe)
+        return _of_standstill(tables, request, observe)
     from commissioner.operations.recordings.running import identified
 
     observe(Began("identifying"))
@@ -130,7 +130,11 @@ def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
     """DataRefused where the recordings cannot carry an answer; UsageError for a file or an estimator that does not exist."""
     said = read_mapping(request.mapping) if request.mapping else None
     _require_measured(request.files, said)
-    recording = joined([to_standstill(contract_table(path, said)) for path in request.files])
+    return _of_standstill([contract_table(path, said) for path in request.files], request, observe)
+
+
+def _of_standstill(tables: Sequence[Table], request: IdentifyRequest, observe: Observe) -> Identified:
+    recording = joined([to_standstill(table) for table in tables])
     plate = None if request.motor is None else load_motor(request.motor)
     plate = plate or nameplate_from(recording.metadata, recording.source)
     trust = trust_from(request.trust)

@@ -1,4 +1,4 @@
-"""Files of one motor, before a diagnosis looks at them: which are recordings, which were copies, are they of one motor."""
+"""Files of one motor, before a diagnosis looks at them: which are recordings, are they independent, are they of one motor."""
 
 from __future__ import annotations
 
@@ -41,23 +41,6 @@ def plate_metadata(motor: str | None) -> dict[str, float | str]:
     if motor is None:
         return {}
     return {k: v for k, v in asdict(load_motor(motor)).items() if v is not None}
-
-
-def without_copies(recordings: Sequence[StandstillRecording]) -> tuple[list[StandstillRecording], list[str]]:
-    """Each recording once, and which were copies: their noise would be none."""
-    kept: list[StandstillRecording] = []
-    remarks = []
-    for one in recordings:
-        same = next((k for k in kept if _holds_the_same(k, one)), None)
-        if same is None:
-            kept.append(one)
-        else:
-            remarks.append(f"{Path(one.source).name} holds the same samples as {Path(same.source).name}: taken once.")
-    return kept, remarks
-
-
-def _holds_the_same(one: StandstillRecording, other: StandstillRecording) -> bool:
-    return np.array_equal(one.current_u_a, other.current_u_a) and np.array_equal(one.time_s, other.time_s)
 
 
 def require_independent(tables: Sequence[Table]) -> None:

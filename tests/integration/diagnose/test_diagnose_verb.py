@@ -143,6 +143,10 @@ def test_a_file_that_is_no_model_is_refused_as_configuration(tmp_path, where):
     assert "model.json" in "".join(answer.stderr.split()) and not (tmp_path / "out.csv").exists()
 
 
-def test_a_file_given_twice_counts_once(files):
-    once, twice = (call("diagnose", *[str(files / "good.csv")] * n, "--json").json for n in (1, 2))
-    assert once["causes"] == twice["causes"] and any("taken once" in sentence for sentence in twice["audit"])
+@pytest.mark.parametrize("verb", ["diagnose", "identify"])
+def test_an_excerpt_under_another_name_is_no_second_measurement(files, tmp_path, verb):
+    lines = (files / "good.csv").read_text("utf-8").splitlines(keepends=True)
+    (tmp_path / "excerpt.csv").write_text("".join(lines[: len(lines) * 2 // 3]), encoding="utf-8")
+    answer = call(verb, str(files / "good.csv"), str(tmp_path / "excerpt.csv"), "--json")
+    assert answer.code == 3
+    assert "the same measured samples" in answer.json["error"]["what"]
