@@ -82,7 +82,7 @@ def whole_stretch(recording: RunningRecording, findings: Findings) -> tuple[int,
             "refused",
             f"{reason} {(high - low) * period:.4g} s without a break: too short to tell a period",
             (high - low) * period,
-            f"at least {SHORTEST_S:g} s, better 30-60 s",
+            f"{SHORTEST_S:g} s, better 30-60 s",
             RECORD_LONGER,
         )
     return low, high

@@ -174,8 +174,9 @@ def said_by_terminals(seen: Refused, stretches: list[State], plate: Nameplate) -
     for state in stretches:
         state["used"] = state is best
     speed, torque = best["mean_speed_rad_per_s"], best["mean_torque_nm"]
-    wanted = "" if seen.reason.limit is None else f"; at least {seen.reason.limit}"
-    why = f"{seen.reason.what}{wanted}".replace("at least at least", "at least")
+    limit = seen.reason.limit
+    wanted = f"{limit:g}" if isinstance(limit, float) else limit
+    why = seen.reason.what if wanted is None else f"{seen.reason.what}; wanted: {wanted}"
     withheld = dict.fromkeys(("parameters", "periods", "waveforms", "trend"), why)
     unused = ", ".join(sorted({s["state"] for s in stretches if s["state"] not in ("steady", "off", "lost")}))
     if unused:
