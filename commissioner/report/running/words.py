@@ -72,6 +72,8 @@ def headline(document: Document) -> str:
     causes = document["causes"]
     if document["verdict"] == "refused":
         return "These data cannot carry an answer."
+    if not document.get("is_complete", True):
+        return "Not finished: stopped when its time was over, before all causes were tried. No cause is named yet."
     if document["verdict"] == "unexplained":
         known = f" Known beside it: {', '.join(class_name(c) for c in causes)}." if causes else ""
         return f"Something is in these data that no cause in the catalogue makes.{known}"
