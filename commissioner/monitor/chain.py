@@ -33,6 +33,7 @@ from commissioner.monitor.machine.waveform import Solved, Waveform
 from commissioner.monitor.periods import combs as comb_search
 from commissioner.monitor.periods.combs import SUPPLY_ORDERS, Found
 from commissioner.monitor.periods.periods import ShaftSearch, slip_of
+from commissioner.monitor.periods.side_bands import SideBands, bar_or_load, side_bands
 from commissioner.monitor.periods.steadiness import frequency_wander, too_little
 from commissioner.monitor.signals import feeder
 from commissioner.monitor.signals.averaging import Comb, Lines, separate
@@ -69,6 +70,7 @@ class Observation:
     proof: Proof
     findings: tuple[Finding, ...]
     inertia_kg_m2: float | None
+    side_bands: SideBands | None
 
     @property
     def pole_pairs(self) -> int:
@@ -192,6 +194,8 @@ def _invert(
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
     ripple_rad = float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2)))
     whole, whole_std = whole_record_speed(frame, part, found, lines, ripple_rad, fitted)
+    slip = slip_of(shaft_speed, lines.supply_rad_per_s, pairs)
+    bands = side_bands(found, search.supply_hz, slip, float(abs(lines.current_a[0])))
     proof = prove(audited, frame, part, combs, problem, solved, fitted.delay_s)
     return Observation(
         audited,
@@ -216,8 +220,9 @@ def _invert(
         torque_std,
         sensor_std,
         proof,
-        (*audited.findings, frequency_wander(frame, part)),
+        (*audited.findings, frequency_wander(frame, part), *bar_or_load(bands)),
         inertia,
+        bands,
     )
 
 

@@ -17,6 +17,7 @@ from commissioner.monitor.machine.slow_slip import slip_phase
 from commissioner.monitor.periods import combs, periods
 from commissioner.monitor.periods.combs import mean_supply
 from commissioner.monitor.periods.periods import ShaftSearch, slip_of
+from commissioner.monitor.periods.side_bands import SideBands, bar_or_load, side_bands
 from commissioner.monitor.periods.steadiness import frequency_wander, too_little
 from commissioner.monitor.signals.quiet import quietest
 from commissioner.monitor.signals.supply import (
@@ -28,7 +29,6 @@ from commissioner.monitor.signals.supply import (
     space_vector,
     turning_frame,
 )
-from commissioner.monitor.trend.indicators import rotor_side_bands
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_current, stator_impedance
@@ -42,6 +42,10 @@ NEAR_SUPPLY_HZ = 0.6
 """A line of the mains' own within so much of a multiple of their frequency."""
 NO_VOLTAGE = "no voltages were recorded"
 NO_PLATE = "no nameplate is known (--motor, or the recording's metadata)"
+OF_POWER = ("voltage_rms_v", "voltage_unbalance", "power_w", "reactive_power_var", "power_factor")
+OF_SHAFT = ("mean_speed_rad_per_s", "slip", "rotor_side_bands")
+OF_MODEL = ("parameters", "waveforms", "current_resimulation_error", "negative_sequence_excess_percent")
+"""What takes voltages, what takes the shaft's line, and what takes both and a plate."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,7 @@ class Partial:
     findings: tuple[Finding, ...] = ()
     by_slip_nm: float | None = None
     """Torque that the plate has at this slip at its own voltage: only tells operating points apart."""
+    side_bands: SideBands | None = None
 
 
 def of_currents(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -> Partial | Finding:
@@ -97,28 +102,23 @@ def of_currents(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -
     )
     found = combs.find(frame, part, search, wishes.load_frequencies_hz)
     trouble = too_little(frame, part, found, search)
-    indicators = {"current_rms_a": current / np.sqrt(2.0), "current_unbalance": audited.fundamental.current_unbalance}
-    withheld = dict.fromkeys(
-        ("mean_torque_nm", "parameters", "power_w", "reactive_power_var", "power_factor", "voltage_unbalance"),
-        _no_voltage(recording),
-    )
-    speed, by_slip = None, None
+    indicators = of_currents_alone(audited.fundamental) | {"current_rms_a": current / np.sqrt(2.0)}
+    withheld = dict.fromkeys(("mean_torque_nm", *OF_MODEL, *OF_POWER), _no_voltage(recording))
+    speed, by_slip, bands = None, None, None
     if trouble is None and found.shaft is not None:
         speed = Quantity(2 * np.pi * found.shaft.frequency_hz, 2 * np.pi * found.shaft.frequency_std_hz)
         seen = slip_of(speed.value, supply, plate.pole_pairs)
         by_slip = plate.rated_power_w / (plate.rated_speed_rpm * np.pi / 30) * seen / plate.rated_slip
         indicators["slip"] = seen
-        bands = rotor_side_bands(found.left_over, supply / (2 * np.pi), seen, current)
-        if bands is not None:
-            indicators["rotor_side_band_db"] = bands.level_db
-        else:
-            withheld["rotor_side_band_db"] = "at this slip they lie too near the fundamental for the length recorded"
+        bands = side_bands(found, supply / (2 * np.pi), seen, current)
+        if bands is None:
+            withheld["rotor_side_bands"] = "at this slip they lie too near the fundamental for the length recorded"
     else:
-        withheld["mean_speed_rad_per_s"] = trouble.what if trouble else "no line of the shaft is seen"
+        withheld |= dict.fromkeys(OF_SHAFT, trouble.what if trouble else "no line of the shaft is seen")
     own = tuple(Line(f.frequency_hz, f.evidence) for f in (found.shaft, *found.loads) if f is not None)
     hidden = {"third_voltage", "crossed_channels", "computed_voltage"}
-    notes = tuple(f for f in audited.findings if f.code not in hidden)
-    return Partial(speed, None, supply / (2 * np.pi), own, indicators, withheld, notes, by_slip)
+    notes = (*(f for f in audited.findings if f.code not in hidden), *bar_or_load(bands))
+    return Partial(speed, None, supply / (2 * np.pi), own, indicators, withheld, notes, by_slip, bands)
 
 
 def _no_voltage(recording: RunningRecording) -> str:
@@ -151,14 +151,10 @@ def without_plate(recording: RunningRecording) -> Partial | Finding:
     supply = follow_supply(v, period, abs(signed))
     f = measure_fundamental(i, v, supply, period, signed < 0)
     frame = turning_frame(i, v, supply, period)
-    indicators = of_terminals(f) if has_volts else {
-        "current_rms_a": float(abs(f.current_a) / np.sqrt(2.0)), "current_unbalance": f.current_unbalance
-    }  # fmt: skip
-    withheld = dict.fromkeys(("mean_speed_rad_per_s", "mean_torque_nm", "parameters"), NO_PLATE)
+    indicators = of_terminals(f) if has_volts else of_currents_alone(f)
+    withheld = dict.fromkeys(("mean_torque_nm", *OF_SHAFT, *OF_MODEL), NO_PLATE)
     if not has_volts:
-        withheld |= dict.fromkeys(
-            ("power_w", "reactive_power_var", "power_factor", "voltage_unbalance"), _no_voltage(recording)
-        )
+        withheld |= dict.fromkeys(OF_POWER, _no_voltage(recording))
     return Partial(None, None, f.frequency_hz, _lines(frame, f.frequency_hz), indicators, withheld)
 
 
@@ -191,11 +187,17 @@ def _centred(x: Vector) -> Vector:
 
 def of_terminals(f: Fundamental) -> dict[str, float]:
     """What the fundamental alone says."""
-    root = np.sqrt(2.0)
     return {
-        "voltage_rms_v": float(abs(f.voltage_v) / root), "current_rms_a": float(abs(f.current_a) / root),
-        "voltage_unbalance": f.voltage_unbalance, "current_unbalance": f.current_unbalance, "power_w": f.power_w,
-        "reactive_power_var": f.reactive_var, "power_factor": f.power_factor,
+        "voltage_rms_v": float(abs(f.voltage_v) / np.sqrt(2.0)), "voltage_unbalance": f.voltage_unbalance, "power_w": f.power_w,
+        "reactive_power_var": f.reactive_var, "power_factor": f.power_factor, **of_currents_alone(f),
+    }  # fmt: skip
+
+
+def of_currents_alone(f: Fundamental) -> dict[str, float]:
+    """What its currents say."""
+    return {
+        "current_rms_a": float(abs(f.current_a) / np.sqrt(2.0)), "current_unbalance": f.current_unbalance,
+        "runs_backwards": f.runs_backwards,
     }  # fmt: skip
 
 
@@ -207,7 +209,7 @@ def _lines(frame: TurningFrame, supply_hz: float) -> tuple[Line, ...]:
     )
     f, power = spectrum.frequency_hz, spectrum.power.copy()
     reach = max(2.0 * spectrum.cell_hz, NEAR_SUPPLY_HZ)
-    power[(np.abs(f / supply_hz - np.round(f / supply_hz)) * supply_hz < reach) | (f < periods.LOWEST_LOAD_HZ)] = 0.0
+    power[(periods.beside_multiple(f, supply_hz) < reach) | (f < periods.LOWEST_LOAD_HZ)] = 0.0
     out: list[Line] = []
     while len(out) < MOST_LINES and power.max() > periods.SIGNIFICANT:
         k = int(np.argmax(power))

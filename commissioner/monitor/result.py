@@ -31,7 +31,8 @@ from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.machine.fit import NAMES, Fitted
 from commissioner.monitor.machine.waveform import Solved
 from commissioner.monitor.partial import Partial, of_terminals
-from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
+from commissioner.monitor.periods.side_bands import SideBands as BesideSupply
+from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import FALSE_ALARM, Entry, Verdict
 from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS, QUANTILE
 from commissioner.motor.running import TCircuit
@@ -148,13 +149,14 @@ def refused_document(refused: Refused) -> RefusedMonitoring:
 def partial_document(part: Partial, stretches: list[State], audited: Audited) -> PartialMonitoring:
     """The numbers that could be had, and why others could not."""
     speed, torque = part.speed_rad_per_s, part.torque_nm
+    bands = {} if part.side_bands is None else {"rotor_side_bands": _bands(part.side_bands)}
     return {
         "outcome": "partial",
         "mean_speed_rad_per_s": None if speed is None else quantity(speed.value, speed.std),
         "mean_torque_nm": None if torque is None else quantity(torque.value, torque.std),
         "parameters": None,
         "periods": [cast("LineRow", asdict(line)) for line in part.lines],
-        "indicators": {"supply_frequency_hz": part.supply_hz, **part.indicators},
+        "indicators": {"supply_frequency_hz": part.supply_hz, **part.indicators, **bands},
         "withheld": dict(part.withheld),
         "trend": None,
         "states": stretches,
@@ -167,8 +169,9 @@ def entry_of_part(part: Partial, source: str) -> Entry | None:
     """What a baseline stores of currents alone: the operating point by the slip; None where the speed is not known."""
     if part.speed_rad_per_s is None or part.by_slip_nm is None:
         return None
-    noise = {"current_unbalance": UNBALANCE_NOISE, "rotor_side_band_db": SIDE_BAND_NOISE_DB}
-    watched = {name: (float(part.indicators[name]), std) for name, std in noise.items() if name in part.indicators}
+    watched = {"current_unbalance": (part.indicators["current_unbalance"], UNBALANCE_NOISE)}
+    if part.side_bands is not None:
+        watched["rotor_side_band_db"] = (part.side_bands.level_db, SIDE_BAND_NOISE_DB)
     return Entry(source, part.speed_rad_per_s.value, part.by_slip_nm, part.supply_hz, watched)
 
 
@@ -201,14 +204,13 @@ def indicator_document(observation: Observation, pulses: Pulses | None, indicato
     }
     document["pulses_per_turn"] = None if pulses is None else pulses.per_turn
     document |= _terminal(observation.audited)
-    bands = rotor_side_bands(
-        observation.found.left_over,
-        observation.search.supply_hz,
-        observation.slip,
-        float(abs(observation.lines.current_a[0])),
-    )
-    document["rotor_side_bands"] = None if bands is None else cast("SideBands", asdict(bands))
+    bands = observation.side_bands
+    document["rotor_side_bands"] = None if bands is None else _bands(bands)
     return document
+
+
+def _bands(bands: BesideSupply) -> SideBands:
+    return cast("SideBands", asdict(bands))
 
 
 def entry_of(observation: Observation, indicators: list[Indicator], source: str) -> Entry:
@@ -261,7 +263,7 @@ def _terminal(audited: Audited) -> Indicators:
     f = audited.fundamental
     if f is None:
         return {}
-    return {"supply_frequency_hz": f.frequency_hz, **of_terminals(f), "runs_backwards": f.runs_backwards}
+    return {"supply_frequency_hz": f.frequency_hz, **of_terminals(f)}
 
 
 def _segment(observation: Observation) -> dict[str, float]:

@@ -18,7 +18,7 @@ from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.lack import Lack, lack_of_fit, rms_errors
 from commissioner.running.rules import RULES
-from commissioner.running.search import Found, Named, Step, search
+from commissioner.running.search import Found, Named, Step, search, so_far
 
 UNEXPLAINED_SIGMA, FAR_OFF_SIGMA, LEAST_SHARE = 0.3, 1.0, 0.97
 """Of the noise, left where no cause is named; left however much was explained; share of the error that causes must explain else."""
@@ -81,6 +81,11 @@ class Diagnosis:
         return self.found.fit.machine.values() if self.found else {}
 
 
+UNFINISHED: tuple[DiagnosisVerdict, str] = (
+    "unexplained", "Not finished: the time allowed was over before every cause was tried and weighed.",
+)  # fmt: skip
+
+
 def diagnose(
     recordings: Sequence[RunningRecording],
     plate: Nameplate,
@@ -91,8 +96,8 @@ def diagnose(
 ) -> Diagnosis:
     """Names what a four-parameter simulation gets wrong about recordings of one running motor.
 
-    Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason. `go_on` is asked between
-    causes; once it says no, the answer is given with what was found so far, and says so.
+    Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason. `go_on` is asked before
+    every refit; once it says no, the search is given up: the answer says so, and names nothing.
     """
     try:
         record = prepare(recordings, plate)
@@ -111,7 +116,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     left = lack_of_fit(found.problem, found.fit.machine)
     causes = tuple(sorted((_cause(found, one) for one in found.accepted), key=lambda c: -c.gain_share))
     gain = _gain(found)
-    verdict, reason = _verdict(causes, left, gain)
+    verdict, reason = _verdict(causes, left, gain) if found.is_complete else UNFINISHED
     remarks = list(record.remarks)
     if verdict == "unexplained" and causes and gain.explained_share < MOSTLY_GUESSES:
         guesses = ", ".join(c.name.replace("_", " ") for c in causes)
@@ -123,6 +128,8 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         remarks.append(
             "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
         )
+        if seen := ", ".join(so_far(found.steps)):
+            remarks.append(f"Seen on the way, and not yet weighed against others: {seen.replace('_', ' ')}.")
     if not record.has_start:
         remarks.append(
             "No start in these data: saturation, deep bars, leakage and gains are hard to tell apart without one."
@@ -133,7 +140,8 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         )
     return Diagnosis(
         verdict, reason, causes, gain, left, _parameters(found.nominal), _parameters(found.fit),
-        next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
+        next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record) if found.is_complete else None,
+        found, record, tuple(remarks),
     )  # fmt: skip
 
 

@@ -56,6 +56,10 @@ class Step:
 WORSE = "what was held out gets worse"
 
 
+class TimeOver(Exception):
+    """`go_on` said no: what was accepted by then was not weighed against what looks alike."""
+
+
 @dataclass(frozen=True)
 class Tried:
     """A candidate refitted: chi-square it gains, and why it is refused (empty where it is not)."""
@@ -74,6 +78,19 @@ class Tried:
     def explains_all(self) -> bool:
         """Whether nothing is left for another."""
         return not self.why and self.fit.chi2 < RULES.nothing_left * self.fit.count
+
+
+def so_far(steps: Iterable[Step]) -> tuple[str, ...]:
+    """The causes that stand accepted after these steps."""
+    names: list[str] = []
+    for step in steps:
+        if step.what == "accepted":
+            names.append(step.cause)
+        elif step.what == "dropped":
+            names.remove(step.cause)
+        elif step.what == "exchanged":
+            names[names.index(step.cause)] = step.why
+    return tuple(names)
 
 
 @dataclass(frozen=True)
@@ -126,7 +143,9 @@ class Search:
 
     def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
         """With these causes free; `near` is a fit near by, whose sensitivities serve as long as they do. `first`: Jacobian for the first
-        step, without spare numbers then."""
+        step, without spare numbers then. TimeOver where the time is."""
+        if not self.go_on():
+            raise TimeOver
         if first is not None:
             own = [Column("p", AT[n]) for c in causes[-1:] for n in c.form.numbers]
             before = self.columns(causes[:-1])
@@ -166,19 +185,24 @@ def search(
     """Names what the four-parameter machine gets wrong. DataRefused where not even that one can be fitted."""
     problem, base = nominal(problem)
     seeking = Search(problem, base, frozenset(excluded), observe, go_on)
-    fit, is_complete = base, True
+    try:
+        return _found(seeking)
+    except TimeOver:
+        plain = unbiased(seeking.problem, seeking.base)
+        return Found(seeking.problem, plain, plain, (), {}, {}, {}, tuple(seeking.steps), is_complete=False)
+
+
+def _found(seeking: Search) -> Found:
+    problem, fit = seeking.problem, seeking.base
     accepted: tuple[Named, ...] = ()
     for round_ in range(RULES.most_causes):
-        if not go_on():
-            is_complete = False
-            break
         taken = _forward(seeking, fit, accepted)
         if taken is None:
             break
         fit, accepted = taken
         if round_ == 0:  # weights of a machine that is nearly right
             seeking.problem = with_noise_of(problem, fit.machine)
-            seeking.base = base = refine(seeking.problem, base.machine, base.columns)
+            seeking.base = refine(seeking.problem, seeking.base.machine, seeking.base.columns)
             fit = refine(seeking.problem, fit.machine, fit.columns)
         fit, accepted = _exchanged(seeking, fit, accepted)
     fit, accepted = _backward(seeking, fit, accepted)
@@ -193,7 +217,7 @@ def search(
         rivals,
         _limits(seeking, fit, accepted),
         tuple(seeking.steps),
-        is_complete,
+        is_complete=True,
     )
 
 

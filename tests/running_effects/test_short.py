@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from commissioner.estimation.record import prepare
+from commissioner.report.running.page import page_of
+from commissioner.running.contract import as_document
 from commissioner.running.diagnosis import diagnose
 from commissioner.running.identification import identify
-from commissioner.running.search import least_promise, least_strength
+from commissioner.running.search import Step, least_promise, least_strength, so_far
 from tests.running_effects.cases import Case, taken, true_size
 from tests.running_effects.protocol import failures, false_names, gains_elsewhere, run, table
 
@@ -83,6 +85,34 @@ def _one(name):
     case = Case(78, "one", only=name)
     recording, plate, _ = taken(case.scenario(), case.seed)
     return [recording], plate
+
+
+def test_a_search_that_is_stopped_gives_up_at_its_next_refit_and_names_nothing():
+    """It went on to the end of its round, and said of what it had not tried that no cause in the catalogue makes it."""
+    steps, refused = [], []
+
+    def go_on():
+        refused.extend(steps[:1])
+        return not steps
+
+    recordings, plate = _one("rotor_asymmetry")
+    seen = diagnose(recordings, plate, observe=steps.append, go_on=go_on)
+    assert len(refused) == 1 and [s.what for s in steps] == ["screened"]
+    document = as_document(seen)
+    assert (document["verdict"], document["causes"], document["is_complete"]) == ("unexplained", [], False)
+    page = page_of(seen, document, "recording.parquet")
+    for said in (document["reason"], page.headline):
+        assert said.startswith("Not finished") and "no cause in the catalogue" not in said
+    assert any("diagnose the recording again without a limit" in r for r in document["remarks"])
+    assert document["next_experiment"] is None
+
+
+def test_what_stands_accepted_after_exchanges_and_drops():
+    steps = [
+        Step("screened", "iron_loss", "", 9.0), Step("accepted", "iron_loss", "", 9.0), Step("accepted", "rotor_heating", "", 5.0),
+        Step("exchanged", "iron_loss", "", 2.0, "rotor_asymmetry"), Step("dropped", "rotor_heating", "", 1.0),
+    ]  # fmt: skip
+    assert so_far(steps) == ("rotor_asymmetry",)
 
 
 def test_slots_that_no_catalogue_names_are_called_unexplained():

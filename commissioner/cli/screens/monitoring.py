@@ -48,7 +48,7 @@ def show_partial(document: Mapping[str, Any]) -> None:
     ):
         if document[key] is not None:
             rows.append((label, quantity(document[key]["value"] * scale, document[key]["std"] * scale, unit)))
-    rows += [(name.replace("_", " "), f"{value:.5g}") for name, value in document["indicators"].items()]
+    rows += [(name.replace("_", " "), _indicated(value)) for name, value in document["indicators"].items()]
     rows += [("modulates the current", f"{line['frequency_hz']:.4f} Hz") for line in document["periods"]]
     out.print(table("A partial answer", ("", ""), rows))
     withheld: dict[str, list[str]] = {}
@@ -62,6 +62,14 @@ def show_partial(document: Mapping[str, Any]) -> None:
         out.print(
             f"{document['trend']['sentence']}: {', '.join(in_words(name)[0] for name in document['trend']['alarms']) or 'no alarm'}"
         )
+
+
+def _indicated(value: float | bool | Mapping[str, float]) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return f"{value['level_db']:.3g} dB at ± {value['offset_hz']:.4g} Hz"
+    return f"{value:.5g}"
 
 
 def _states(document: Mapping[str, Any], where: Console) -> None:

@@ -233,7 +233,9 @@ def lowest_fundamental(
         orders = np.arange(1, max(4 * m, 8) + 1)
         orders = orders[orders * fundamental <= spectrum.frequency_hz[-1]]
         values = spectrum.at(orders * fundamental, 0.4)
-        foreign = np.array([any(_is_multiple(h * fundamental, f, spectrum.cell_hz) for f in known_hz) for h in orders])
+        foreign = np.zeros(orders.size, dtype=np.bool_)
+        for known in known_hz:
+            foreign |= beside_multiple(orders * fundamental, known, 1) < 1.5 * spectrum.cell_hz
         seen = (values > VISIBLE) & ~foreign
         for k in np.flatnonzero(seen & (orders % m != 0)):
             seen[k] = not is_product(orders[k] * fundamental, [*known_hz, line_hz], supply_hz, spectrum.cell_hz)
@@ -243,9 +245,9 @@ def lowest_fundamental(
     return best, best_seen
 
 
-def _is_multiple(frequency_hz: float, fundamental_hz: float, tolerance_hz: float) -> bool:
-    order = max(round(frequency_hz / fundamental_hz), 1)
-    return bool(abs(frequency_hz - order * fundamental_hz) < 1.5 * tolerance_hz)
+def beside_multiple(frequency_hz: NDArray[np.float64] | float, of_hz: float, first: int = 0) -> Signal:
+    """How far from the nearest multiple of `of_hz`, from the `first` one on."""
+    return np.abs(frequency_hz - of_hz * np.maximum(np.round(np.asarray(frequency_hz) / of_hz), first))
 
 
 NEAR_MAINS_HZ, NEAR_MAINS_CELLS = 0.7, 6.0
@@ -256,26 +258,21 @@ NEAR_COMB_HZ = 0.3
 
 def on_mains_skirt(frequency_hz: float, mains_hz: float, cell_hz: float) -> bool:
     """Beside a multiple of `mains_hz`, whose line is far stronger than any load's."""
-    beside = abs(frequency_hz - mains_hz * round(frequency_hz / mains_hz))
-    return bool(beside < max(NEAR_MAINS_HZ, NEAR_MAINS_CELLS * cell_hz))
+    return bool(beside_multiple(frequency_hz, mains_hz) < max(NEAR_MAINS_HZ, NEAR_MAINS_CELLS * cell_hz))
 
 
 def is_mains_side_band(spectrum: PairSpectrum, frequency_hz: float, mains_hz: float, below_hz: float) -> bool:
     """As far from a multiple of `mains_hz` as a stronger line below `below_hz` is from zero: that load swings the mains' line as well."""
-    beside = abs(frequency_hz - mains_hz * round(frequency_hz / mains_hz))
+    beside = float(beside_multiple(frequency_hz, mains_hz))
     own, load = (float(spectrum.at(f, LOBE_CELLS)[0]) for f in (frequency_hz, beside))
     return beside < below_hz and load > max(own, SIGNIFICANT)
-
-
-def _distance(frequency_hz: float, fundamental_hz: float) -> float:
-    return abs(frequency_hz - fundamental_hz * max(round(frequency_hz / fundamental_hz), 1))
 
 
 def is_product(frequency_hz: float, combs_hz: list[float], supply_hz: float, tolerance_hz: float) -> bool:
     """True where the line is a sum or difference of known combs and even mains harmonics: mixing, not a load."""
     if frequency_hz > 0.5 * supply_hz and on_mains_skirt(frequency_hz, supply_hz, tolerance_hz):
         return True
-    if any(_distance(frequency_hz, f) < max(NEAR_COMB_HZ, 4 * tolerance_hz) for f in combs_hz):
+    if any(beside_multiple(frequency_hz, f, 1) < max(NEAR_COMB_HZ, 4 * tolerance_hz) for f in combs_hz):
         return True
     multiples = [np.arange(-12, 13) * f if k == 0 else np.arange(-6, 7) * f for k, f in enumerate(combs_hz)]
     mains = np.array([-2.0, -1.0, 0.0, 1.0, 2.0, 6.0, -6.0]) * supply_hz

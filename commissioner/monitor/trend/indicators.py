@@ -1,4 +1,4 @@
-"""Numbers that a person trends: torque pulses compared, ripples, unbalance, rotor side bands.
+"""Numbers that a person trends: torque pulses compared, ripples, unbalance.
 
 Pulses after Schantz & Leeb, IV-D and Table I: each part of the shaft turn belongs to one cylinder (vane, tooth); the pulses
 are normalised and laid over each other; the area between the curves says how unlike they are. The plain difference of their
@@ -15,7 +15,6 @@ import numpy as np
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.intake.findings import Fundamental
 from commissioner.monitor.machine.inversion import SpeedLines, basis_of, torque_of
-from commissioner.monitor.periods.periods import PairSpectrum
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.running import TCircuit, stator_impedance
@@ -147,26 +146,6 @@ def negative_sequence_excess(fundamental: Fundamental, circuit: TCircuit, slip: 
     impedance = stator_impedance(circuit, 2 * np.pi * fundamental.frequency_hz, 2 - slip)
     expected = fundamental.voltage_negative_v / impedance
     return float(abs(fundamental.current_negative_a - expected) / max(abs(fundamental.current_a), 1e-12))
-
-
-@dataclass(frozen=True)
-class SideBands:
-    """Rotor-asymmetry side bands at (1 +- 2 s) f: where, how high against the fundamental, and above the local floor."""
-
-    offset_hz: float
-    level_db: float
-    above_floor_db: float
-
-
-def rotor_side_bands(spectrum: PairSpectrum, supply_hz: float, slip: float, current_a: float) -> SideBands | None:
-    """The pair at 2 s f in the supply's frame; None where it is closer to the fundamental than three cells."""
-    offset = 2 * slip * supply_hz
-    if offset < 3 * spectrum.cell_hz:
-        return None
-    k = round(offset / spectrum.frequency_hz[1])
-    above = float(spectrum.at(offset)[0])
-    level = np.sqrt(0.5 * above * spectrum.floor_a2[k]) / current_a
-    return SideBands(offset, float(20 * np.log10(level + 1e-12)), float(10 * np.log10(above + 1e-12)))
 
 
 def trendable(observation: Observation, made: Pulses | None) -> list[Indicator]:

@@ -17,7 +17,8 @@ from commissioner.monitor.intake.states.naming import LEAST_STEADY_S, START_CURR
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals, power_wander_w
 from commissioner.monitor.loads.pairing_by_start import wired_in
-from commissioner.monitor.partial import Partial, of_terminals, refused_audit
+from commissioner.monitor.partial import OF_MODEL, Partial, of_terminals, refused_audit
+from commissioner.monitor.periods.periods import slip_of
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
@@ -177,7 +178,7 @@ def said_by_terminals(seen: Refused, stretches: list[State], plate: Nameplate) -
     limit = seen.reason.limit
     wanted = f"{limit:g}" if isinstance(limit, float) else limit
     why = seen.reason.what if wanted is None else f"{seen.reason.what}; wanted: {wanted}"
-    withheld = dict.fromkeys(("parameters", "periods", "waveforms", "trend"), why)
+    withheld = dict.fromkeys((*OF_MODEL, "periods", "rotor_side_bands", "trend"), why)
     unused = ", ".join(sorted({s["state"] for s in stretches if s["state"] not in ("steady", "off", "lost")}))
     if unused:
         withheld["from other states"] = (
@@ -186,6 +187,8 @@ def said_by_terminals(seen: Refused, stretches: list[State], plate: Nameplate) -
     moves = _load_moves(seen.audited, plate)
     f = seen.audited.fundamental
     indicators = {} if f is None else of_terminals(f)
+    if f is not None:
+        indicators["slip"] = slip_of(speed["value"], 2 * np.pi * f.frequency_hz, plate.pole_pairs)
     return Partial(
         Quantity(speed["value"], speed["std"] or 0.0), Quantity(torque["value"], torque["std"] or 0.0), best["frequency_hz"],
         (), indicators, withheld, () if moves is None else (moves,),

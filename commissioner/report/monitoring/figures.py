@@ -138,8 +138,15 @@ def spectrum(seen: Observation) -> Figure:
                     fontsize=8,
                     color=colour,
                 )
-    slip_line = 2 * seen.slip * seen.search.supply_hz
-    top.axvline(slip_line, color=RED, alpha=0.5, linewidth=1.0, linestyle=":", label="2 s f (rotor side band)")
+    slip_line = 2 * abs(seen.slip) * seen.search.supply_hz
+    top.axvline(
+        slip_line,
+        color=RED,
+        alpha=0.5,
+        linewidth=1.0,
+        linestyle=":",
+        label="2 s f (rotor, or a load that swings there)",
+    )
     top.margins(y=0.3)
     top.set_ylim(bottom=-8)
     top.legend(frameon=False, ncols=2, loc="upper right", fontsize=8)

@@ -51,13 +51,17 @@ def quantity(entry: Mapping[str, Any], *, short: bool = False) -> str:
 
 
 def main_size(cause: Mapping[str, Any]) -> str:
-    """The one that is spoken of, without interval."""
-    return quantity(next(iter(cause["parameters"].values())), short=True)
+    """The one that is spoken of: its amount, or with sign and interval where that holds zero."""
+    entry = next(iter(cause["parameters"].values()))
+    amount = abs(entry["value"])
+    if half_width(entry["std"] or 0.0) < amount:
+        return quantity({**entry, "value": amount}, short=True)
+    return quantity(entry)
 
 
 def sentence(cause: Mapping[str, Any]) -> str:
     """What the cause does, with its size; of a class, that it is one of them."""
-    said = CATALOGUE[cause["name"]].says.format(size=main_size(cause).lstrip("-"))
+    said = CATALOGUE[cause["name"]].says.format(size=main_size(cause))
     key, first = next(iter(cause["parameters"].items()))
     phase = next((part for part in key.split("_") if part in ("u", "v", "w")), "")
     for one in ("phase", "line", "current sensor", "voltage sensor") if phase else ():
@@ -72,6 +76,8 @@ def headline(document: Document) -> str:
     causes = document["causes"]
     if document["verdict"] == "refused":
         return "These data cannot carry an answer."
+    if not document.get("is_complete", True):
+        return "Not finished: stopped when its time was over, before all causes were tried. No cause is named yet."
     if document["verdict"] == "unexplained":
         known = f" Known beside it: {', '.join(class_name(c) for c in causes)}." if causes else ""
         return f"Something is in these data that no cause in the catalogue makes.{known}"

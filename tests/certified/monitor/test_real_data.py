@@ -10,8 +10,8 @@ import pytest
 
 from commissioner.monitor.intake.audit import inspect, measure_fundamental
 from commissioner.monitor.periods.periods import pair_spectrum, slip_of
+from commissioner.monitor.periods.side_bands import rotor_side_bands
 from commissioner.monitor.signals.supply import dominant_frequency_hz, follow_supply, space_vector
-from commissioner.monitor.trend.indicators import rotor_side_bands
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_power
 from commissioner.recordings.formats.matlab import vectors

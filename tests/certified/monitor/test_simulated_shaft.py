@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from commissioner.monitor.periods.side_bands import rotor_side_bands
 from commissioner.monitor.result import as_document
-from commissioner.monitor.trend.indicators import pulses, rotor_side_bands
+from commissioner.monitor.trend.indicators import pulses
 from commissioner.motor.circuit import from_t_model
 from sim.recordings.running import load_scenario, run
 from tests.campaigns.monitor import draw, periods_found, play, score

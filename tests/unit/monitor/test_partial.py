@@ -9,6 +9,8 @@ import pytest
 
 from commissioner.errors import ConfigurationError
 from commissioner.monitor.intake.states.stretches import states
+from commissioner.monitor.periods.periods import beside_multiple, pair_spectrum
+from commissioner.monitor.periods.side_bands import rotor_side_bands
 from commissioner.operations.recordings.monitor import MonitorRequest, NotMonitored, PartlyMonitored, monitor
 from commissioner.recordings.imported import store, understand
 from commissioner.recordings.importers import contract_table
@@ -145,6 +147,7 @@ def test_a_load_without_ripple_has_torque_and_speed_of_the_terminals(tmp_path: P
     assert torque["value"] == pytest.approx((power - copper) / (50 * np.pi), abs=torque["std"])
     assert torque["std"] > 0.02 * np.sqrt(3) * 400.0 * 4.86 / (50 * np.pi) > 0.1 * torque["std"]
     assert 0.0 < 50 * np.pi - speed["value"] < 2 * (50 * np.pi - 1436 * np.pi / 30)
+    assert document["indicators"]["slip"] == pytest.approx(1 - speed["value"] / (50 * np.pi), abs=1e-5)
     assert "neither the shaft" in document["withheld"]["periods"]
 
 
@@ -194,3 +197,63 @@ def test_a_line_beyond_the_slip_that_the_power_allows_is_no_shaft(tmp_path: Path
     document = watched(tmp_path, made, PLATE).document
     assert document["mean_speed_rad_per_s"]["value"] < 50 * np.pi
     assert document["mean_torque_nm"]["value"] > 5.0
+
+
+FULL = {
+    "mean_speed_rad_per_s", "mean_torque_nm", "slip", "parameters", "waveforms", "current_resimulation_error", "negative_sequence_excess_percent",
+    "rotor_side_bands", "supply_frequency_hz", "voltage_rms_v", "voltage_unbalance", "current_rms_a", "current_unbalance", "runs_backwards",
+    "power_w", "reactive_power_var", "power_factor",
+}  # fmt: skip
+"""What a full answer tells of a motor, by the names of the contract."""
+
+
+@pytest.mark.parametrize(
+    ("made", "plate"), [(columns(), PLATE), (columns(volts=True), {}), (columns(), {}), (even(), PLATE)]
+)
+def test_all_that_a_full_answer_tells_is_there_or_has_its_reason(tmp_path: Path, made: dict, plate: dict) -> None:
+    document = watched(tmp_path, made, plate).document
+    told = {name for name, value in {**document, **document["indicators"]}.items() if value is not None}
+    withheld = document["withheld"]
+    assert told | set(withheld) >= FULL and not told - {"periods"} & set(withheld)
+    assert all(withheld.values())
+
+
+def swinging(beside_hz: float) -> dict:
+    """Both side bands, 1 % each, at `beside_hz` from the supply's line."""
+    made = columns(20.0)
+    for k, p in enumerate("uvw"):
+        turn = 2 * np.pi * (50 * made["time_s"] - k / 3) - 0.85
+        made[f"current_{p}_a"] += 5.6 * 0.02 * np.cos(2 * np.pi * beside_hz * made["time_s"]) * np.cos(turn)
+    return made
+
+
+def test_side_bands_at_twice_the_slip_are_told_with_all_that_makes_them(tmp_path: Path) -> None:
+    """At 2 s f = 2 (50 - 2 x 24.285) Hz stand a rotor's and a load's alike; a hertz beside stand a load's, and none are the rotor's."""
+    twice_slip_hz = 2 * (50 - 2 * SHAFT_HZ)
+    document = watched(tmp_path, swinging(twice_slip_hz), PLATE).document
+    bands = document["indicators"]["rotor_side_bands"]
+    assert bands["offset_hz"] == pytest.approx(twice_slip_hz, abs=0.02)
+    assert bands["level_db"] == pytest.approx(20 * np.log10(0.01), abs=0.5)
+    (note,) = (f for f in document["audit"]["findings"] if f["code"] == "side_bands")
+    assert "broken rotor bars" in note["what"] and "a load that swings" in note["what"]
+    for other in (columns(20.0), swinging(twice_slip_hz + 1)):
+        document = watched(tmp_path, other, PLATE).document
+        assert document["indicators"]["rotor_side_bands"]["above_floor_db"] < note["limit"]
+        assert "side_bands" not in {f["code"] for f in document["audit"]["findings"]}
+
+
+def test_a_generators_side_bands_lie_at_twice_its_slip_too() -> None:
+    t = np.arange(8000) / 400.0
+    random = np.random.default_rng(3)
+    noise = 1e-3 * (random.standard_normal(t.size) + 1j * random.standard_normal(t.size))
+    spectrum = pair_spectrum(0.02 * np.cos(2 * np.pi * 1.5 * t) + noise, 1 / 400, 180.0)
+    driven, driving = (rotor_side_bands(spectrum, 50.0, slip, 1.0) for slip in (0.015, -0.015))
+    assert driven == driving is not None
+    assert driving.level_db == pytest.approx(-40.0, abs=0.5)
+
+
+@pytest.mark.parametrize("frequency_hz", [0.4, 24.9, 25.0, 62.5, 149.3])
+def test_the_distance_to_the_nearest_multiple(frequency_hz: float) -> None:
+    multiples = 50.0 * np.arange(5)
+    assert beside_multiple(frequency_hz, 50.0) == np.abs(frequency_hz - multiples).min()
+    assert beside_multiple(frequency_hz, 50.0, first=1) == np.abs(frequency_hz - multiples[1:]).min()

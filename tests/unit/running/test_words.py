@@ -12,6 +12,20 @@ def test_the_phase_stands_in_the_sentence():
     assert sentence(CAUSE).startswith("Phase v of the stator takes 3.86 % of rated current")
 
 
+def test_a_size_that_the_data_leave_open_is_said_with_its_interval():
+    """At one operating point saturation shows while its size does not: -14 % was said as 14 % more current, and no interval."""
+    said = {
+        value: sentence(
+            {**CAUSE, "name": "magnetizing_saturation", "form": "air-gap flux",
+             "parameters": {"extra_at_rated_flux": {"value": value, "std": std, "unit": ""}}}
+        )
+        for value, std in ((-0.14, 1.69), (0.52, 1.52), (0.31, 0.01))
+    }  # fmt: skip
+    assert "takes \u221210 ± 330 % more" in said[-0.14]
+    assert "takes 50 ± 300 % more" in said[0.52]
+    assert "takes 31.0 % more" in said[0.31]
+
+
 def test_a_tie_says_so():
     late = {
         **CAUSE,
