@@ -135,6 +135,9 @@ CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|spee
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
 _NUMBERED = re.compile(r"([a-z]+)([0-9])(?:a|v|ma|mv|kv)?")
+_OF_THREE = re.compile(
+    rf"(?:^|(?<=\.))({CURRENT}|{VOLTAGE})[ _]?(abc|uvw|rst)[ _.]?[\[(]?([012])[\])]?((?:\s*[\[(/].*)?)$", re.IGNORECASE
+)
 _ONE_PHASE = re.compile(r"[abcuvwrst123]|l[123]")
 _PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
 _CLOCK_FORM = re.compile(r"[hmsdy]+(?:[:.,/ -]+[hmsdyf]+)*:[hmsf]+(?:[.,]\w+)?", re.IGNORECASE)
@@ -217,10 +220,10 @@ def uses_ryb(names: Iterable[str]) -> bool:
 def in_company(names: Sequence[str]) -> dict[str, str]:
     """The names as they are to be read beside each other: phases that are called R, Y, B with R, S, T in their place, and without
     a unit that only a phase of its own name could be (`Current (A)` where there is no `Current (B)`)."""
-    ours = [translated(name) for name in names]
+    ours = [translated(_lettered(name)) for name in names]
     if uses_ryb(ours):
         return dict(zip(names, (_COLOURED.sub(_as_rst, name) for name in ours), strict=True))
-    return {name: IN_NAME.sub("", name).strip() if _is_unit_alone(name, names) else name for name in names}
+    return {name: IN_NAME.sub("", name).strip() if _is_unit_alone(name, names) else _lettered(name) for name in names}
 
 
 def _is_unit_alone(name: str, names: Sequence[str]) -> bool:
@@ -254,7 +257,15 @@ def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
     for name in names:
         if found := _NUMBERED.fullmatch(re.sub(r"[^a-z0-9]", "", name.lower())):
             stems.setdefault(found[1], {})[found[2]] = name
-    return frozenset(name for by in stems.values() if set(by) == {"0", "1", "2"} for name in by.values())
+    return frozenset(
+        name for by in stems.values() if set(by) == {"0", "1", "2"} for name in by.values() if _lettered(name) == name
+    )
+
+
+def _lettered(name: str) -> str:
+    """Of a signal that names its phases, counted from zero, the one meant: `i_abc[1]` as `i_b`; any other name as it is."""
+    found = _OF_THREE.search(name)
+    return f"{found[1]}_{found[2][int(found[3])]}{found[4]}" if found else name
 
 
 def key_of(name: str) -> str:

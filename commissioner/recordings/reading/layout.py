@@ -84,9 +84,9 @@ def split(line: str, separator: str) -> Row:
 
 
 def _said(line: str, separator: str) -> Row:
-    """The cells of a line above the numbers; of a comment a number whole that its comma would cut (`# rated_current_a: 4,86`)."""
+    """The cells of a line above the numbers; a number behind its key whole that its comma would cut (`# rated_current_a: 4,86`)."""
     cells = split(line.lstrip("# "), separator)
-    if separator != "," or not line.startswith("#"):
+    if separator != ",":
         return cells
     out = cells[:1]
     for cell in cells[1:]:
