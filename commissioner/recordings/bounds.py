@@ -23,6 +23,7 @@ NUMBER_BYTES = 8
 _CHUNK = 1 << 20
 _FIXED = (
     pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_timestamp, pa.types.is_time, pa.types.is_duration,
+    pa.types.is_boolean,
 )  # fmt: skip
 """Types of columns that are numbers or times, each of a fixed size."""
 

@@ -28,6 +28,7 @@ from commissioner.recordings.reading.mend import (
     TIME_MADE,
     against_interval,
     from_days,
+    from_epoch,
     require_one_block,
     require_seconds,
     require_stamps,
@@ -69,6 +70,8 @@ PLATE_KEYS = frozenset((*(one.name for one in fields(Nameplate)), "sample_period
 _EXPORT = "export the recording as CSV or Parquet"
 NOT_READ = {
     ".mdf": ("MDF 3", _EXPORT),
+    ".h5": ("HDF5", _EXPORT),
+    ".hdf5": ("HDF5", _EXPORT),
     ".toml": ("TOML", "give a nameplate by --motor, a mapping by --map, and the recording or the sheet as CSV"),
 }  # fmt: skip
 """What the files are, and what to do."""
@@ -229,8 +232,9 @@ def _of_table(table: Table, mapping: ChannelMap) -> Table:
     names = tuple(table.columns)
     targets = {**mapping_in(table.metadata, names), **mapping.columns}
     found = recognise(names, ["" for _ in names], list(table.columns.values()), targets, table.source)
+    clock = clock_in((k, str(v), "") for k, v in table.metadata.items())
     period = table.metadata.get("sample_period_s")
-    clock = Clock(float(period), said_by="sample_period_s") if isinstance(period, float) else Clock()
+    clock = replace(clock, interval_s=period, said_by="sample_period_s") if isinstance(period, float) else clock
     return _table(found, table.metadata, clock, mapping, table.source, ())
 
 
@@ -252,7 +256,7 @@ def _table(
     metadata = {**metadata, **mapping.metadata}
     if is_sheet(r.name for r in found.readings):
         metadata = {**windings_said(metadata, source), **metadata}
-    columns = _of_one_length(found.columns)
+    columns, shorter = _of_one_length(found.columns)
     period = metadata.get("sample_period_s")
     if clock.interval_s is None and isinstance(period, float):
         clock = replace(clock, interval_s=period, said_by="sample_period_s")
@@ -261,7 +265,7 @@ def _table(
         metadata.setdefault("sample_period_s", clock.interval_s)
     _with_constants(columns, metadata)
     unnamed = [ReadingNote(UNNAMED, f"{name}: its name does not say what it is") for name in found.unnamed]
-    return Table(columns, metadata, source, (*notes, *found.notes, *timed, *unnamed), found.readings)
+    return Table(columns, metadata, source, (*notes, *found.notes, *shorter, *timed, *unnamed), found.readings)
 
 
 def _timed(
@@ -273,9 +277,10 @@ def _timed(
         require_seconds(columns, readings, source)
         require_stamps(columns, source)
         columns, untimed = without_untimed_rows(columns)
+        columns, epoch = from_epoch(columns)
         columns, midnight = through_midnight(columns)
         columns, days = from_days(columns)
-        notes = [*untimed, *midnight, *days, *against_interval(columns, clock, readings, source)]
+        notes = [*untimed, *epoch, *midnight, *days, *against_interval(columns, clock, readings, source)]
     if "time_s" not in columns or not any(name.startswith("current_") for name in columns):
         return columns, notes
     require_one_block(columns, source)
@@ -286,11 +291,19 @@ def _timed(
     return columns, [*notes, *empty, *doubled, *whole, *running]
 
 
-def _of_one_length(columns: Mapping[str, Signal]) -> dict[str, Signal]:
-    """The columns as long as the longest of the contract's; all of them where there is none."""
-    ours = [v.size for name, v in columns.items() if name in CONTRACT_COLUMNS]
-    longest = max(ours, default=max((v.size for v in columns.values()), default=0))
-    return {name: v for name, v in columns.items() if v.size == longest}
+def _of_one_length(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns as long as the longest of the contract's (all of them where there is none), and which of its were not."""
+    ours = {name: v.size for name, v in columns.items() if name in CONTRACT_COLUMNS}
+    longest = max(ours.values(), default=max((v.size for v in columns.values()), default=0))
+    others = [f"{name} {size}" for name, size in ours.items() if size != longest]
+    note = (
+        ReadingNote(
+            "length", f"{max(ours, key=ours.__getitem__)} holds {longest} values, {', '.join(others)}: not used"
+        )
+        if others
+        else None
+    )
+    return {name: v for name, v in columns.items() if v.size == longest}, [note] if note else []
 
 
 def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str]) -> None:
@@ -306,7 +319,7 @@ def _lacks(table: Table, missing: list[str]) -> DataRefused:
     return DataRefused(
         f"{table.source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
         step="recognise columns",
-        value="; ".join([_some(table.columns), *(note.what for note in table.notes if note.code == "no_number")]),
+        value="; ".join([_some(table.columns), *(note.what for note in table.notes if note.code in {"no_number", "length"})]),
         limit="time_s, three line currents and three voltages, in SI units",
         remedy=f"{HOW_TO_MAP}; three currents and three voltages with units may be told by their signals where the plate is given (--motor)"
         if unnamed else "record all six channels against time, or rename the columns to the contract's (time_s, "

@@ -135,6 +135,9 @@ CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|spee
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
 _NUMBERED = re.compile(r"([a-z]+)([0-9])(?:a|v|ma|mv|kv)?")
+_OF_THREE = re.compile(
+    rf"(?:^|(?<=\.))({CURRENT}|{VOLTAGE})[ _]?(abc|uvw|rst)[ _.]?[\[(]?([012])[\])]?((?:\s*[\[(/].*)?)$", re.IGNORECASE
+)
 _ONE_PHASE = re.compile(r"[abcuvwrst123]|l[123]")
 _PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
 _CLOCK_FORM = re.compile(r"[hmsdy]+(?:[:.,/ -]+[hmsdyf]+)*:[hmsf]+(?:[.,]\w+)?", re.IGNORECASE)
@@ -216,11 +219,14 @@ def uses_ryb(names: Iterable[str]) -> bool:
 
 def in_company(names: Sequence[str]) -> dict[str, str]:
     """The names as they are to be read beside each other: phases that are called R, Y, B with R, S, T in their place, and without
-    a unit that only a phase of its own name could be (`Current (A)` where there is no `Current (B)`)."""
-    ours = [translated(name) for name in names]
+    a unit that only a phase of its own name could be (`Current (A)` where there is no `Current (B)`); `i_abc[1]`, counted from zero,
+    as `i_b`."""
+    from_zero = _from_zero(names)
+    said = {name: _lettered(name) if name in from_zero else name for name in names}
+    ours = [translated(name) for name in said.values()]
     if uses_ryb(ours):
-        return dict(zip(names, (_COLOURED.sub(_as_rst, name) for name in ours), strict=True))
-    return {name: IN_NAME.sub("", name).strip() if _is_unit_alone(name, names) else name for name in names}
+        return dict(zip(said, (_COLOURED.sub(_as_rst, name) for name in ours), strict=True))
+    return {name: IN_NAME.sub("", name).strip() if _is_unit_alone(name, names) else own for name, own in said.items()}
 
 
 def _is_unit_alone(name: str, names: Sequence[str]) -> bool:
@@ -249,12 +255,23 @@ def _letters(said: str) -> str:
 
 
 def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
-    """Names whose phases are 0, 1, 2 (`i_abc[0]` ...): which of them is u is not what their numbers say elsewhere."""
+    """Names whose phases are 0, 1, 2 (`i[0]` ...): which of them is u is not what their numbers say elsewhere, unless the signal
+    names them (`i_abc[0]`)."""
+    return frozenset(name for name in _from_zero(names) if _lettered(name) == name)
+
+
+def _from_zero(names: Iterable[str]) -> frozenset[str]:
     stems: dict[str, dict[str, str]] = {}
     for name in names:
         if found := _NUMBERED.fullmatch(re.sub(r"[^a-z0-9]", "", name.lower())):
             stems.setdefault(found[1], {})[found[2]] = name
     return frozenset(name for by in stems.values() if set(by) == {"0", "1", "2"} for name in by.values())
+
+
+def _lettered(name: str) -> str:
+    """Of a signal that names its phases the one meant, counted from zero: `i_abc[1]` as `i_b`; any other name as it is."""
+    found = _OF_THREE.search(name)
+    return f"{found[1]}_{found[2][int(found[3])]}{found[4]}" if found else name
 
 
 def key_of(name: str) -> str:

@@ -29,6 +29,7 @@ from commissioner.recordings.formats.parquet import columns_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.said_tests import codes, is_title, unknown
 from commissioner.recordings.reading.slow_columns import currents_on_the_commands_clock, on_one_clock
+from commissioner.recordings.units import without_brackets
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
     POINT_COLUMNS,
@@ -97,7 +98,7 @@ def read_table(path: Path) -> Table:
     if not path.is_file():
         raise no_file(path, "read recording")
     try:
-        if path.suffix == ".parquet":
+        if path.suffix.lower() == ".parquet":
             return _read_parquet(path)
         if _is_binary(path):
             raise _refuse(
@@ -105,7 +106,7 @@ def read_table(path: Path) -> Table:
                 "the file holds bytes, not text",
                 path.suffix or "no ending",
                 READ,
-                "give the recording, not a picture of it",
+                "export the recording as CSV by the program that wrote it; a picture of it cannot be read",
             )
         return _read_csv(path)
     except (
@@ -371,8 +372,9 @@ def _read_parquet(path: Path) -> Table:
     if path.stat().st_size > MAX_BYTES:
         raise too_large(path, path.stat().st_size, MAX_BYTES)
     columns, lost, notes = columns_of(path, file)
+    read = {without_brackets(name) for name in columns.column_names}
     for name in file.schema_arrow.names:
-        if name in lost or (name in CONTRACT_COLUMNS and pa.types.is_nested(file.schema_arrow.field(name).type)):
+        if name in lost or (name in CONTRACT_COLUMNS and name not in read):
             raise _not_numeric(path, name, file.schema_arrow.field(name).type)
     raw = file.schema_arrow.metadata or {}
     metadata = {k.decode(): v.decode() for k, v in raw.items() if not k.startswith((b"ARROW", b"pandas"))}
@@ -441,7 +443,13 @@ def _first_text(column: pa.ChunkedArray) -> str:
 
 
 def _not_numeric(path: Path, name: str, seen: object) -> DataRefused:
-    return _refuse(path, f"column {name} is not numeric", str(seen), "numbers in SI units", "decimal points, no units")
+    return _refuse(
+        path,
+        f"column {name} is not numeric",
+        str(seen),
+        "numbers in SI units",
+        "store it as numbers, with decimal points and without units; a time as seconds or time stamps",
+    )
 
 
 CONTRACT_COLUMNS = frozenset(

@@ -29,6 +29,7 @@ WHOLE = {
     "в": ("voltage", 1.0), "кв": ("voltage", 1e3), "ka": ("current", 1e3), "kv": ("voltage", 1e3),
 }  # fmt: skip
 PREFIX_WORD = {"milli": 1e-3, "mili": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9, "kilo": 1e3}
+DAY_S = 86400
 NO_UNIT = frozenset({"", "-", "none", "sequence", "unit", "units"})
 """What stands in a row of units where a column has none."""
 FOREIGN = frozenset({"%", "pu", "p.u.", "counts", "count", "lsb", "digits", "raw", "bit", "bits", "db", "div", "dbv"})
@@ -52,9 +53,10 @@ class Unit:
 
 
 def unit_in(name: str) -> str:
-    """The text of the unit at the end of a name, or nothing."""
+    """The text of the unit at the end of a name, or nothing; `i(t)` is a function of time."""
     found = IN_NAME.search(name)
-    return next((g for g in found.groups() if g), "") if found else ""
+    text = next((g for g in found.groups() if g), "") if found else ""
+    return "" if text.strip() == "t" else text
 
 
 def without_brackets(name: str) -> str:

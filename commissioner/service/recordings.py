@@ -33,6 +33,8 @@ ENDINGS = (
     ".cff",
     ".txt",
     ".xlsx",
+    ".xlsm",
+    ".xlsb",
     ".xls",
     ".ods",
 )

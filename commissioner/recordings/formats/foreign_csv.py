@@ -80,7 +80,7 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     if factors := factors_in(layout.preface):
         notes.append(ReadingNote("factors", f"{factors} stands above the columns: numbers are taken as they are printed; where they do not "
                                  "hold this factor yet, map the channels with it"))  # fmt: skip
-    names, units, clock = _start_and_increment(layout, clock_in(said))
+    names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
     units = tuple(unit or _said_once(name, units_in(said)) for name, unit in zip(names, units, strict=True))
     return RawTable(names, units, tuple(columns), dict(metadata_of(said)), clock, tuple(notes))
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import NUMBER_BYTES, bounded_bytes, too_large, unpacked_limit
 from commissioner.recordings.formats.stretch import Stretch
 from commissioner.records import Signal
@@ -81,8 +82,13 @@ def variables(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], di
     raw = bounded_bytes(path)
     order = {b"IM": "<", b"MI": ">"}.get(raw[_HEADER - 2 : _HEADER], "")
     file = _Bytes(memoryview(raw)[_HEADER:], order, path)
-    if not order or raw[:10] == b"MATLAB 7.3" or _HDF5 in raw[512:520]:
-        file.refuse("another format, such as v7.3 (HDF5) or v4")
+    if _HDF5 in (raw[:4], raw[512:516]) or raw[:10] == b"MATLAB 7.3":
+        raise DataRefused(
+            f"{path}: MATLAB v7.3 files (HDF5) are not read", step="read recording", value="v7.3", limit=file.form,
+            remedy="load it in MATLAB and save it again with '-v7', or export the recording as CSV or Parquet",
+        )  # fmt: skip
+    if not order:
+        file.refuse("another format, such as v4")
     found: dict[str, Signal] = {}
     texts: dict[str, float | str] = {}
     left: dict[str, str] = {}

@@ -12,10 +12,9 @@ import pyarrow.parquet as pa_parquet
 from commissioner.recordings.bounds import numeric_columns
 from commissioner.recordings.formats.counts import in_unit, is_said
 from commissioner.recordings.names import meanings_of
-from commissioner.recordings.units import without_brackets
+from commissioner.recordings.units import DAY_S, without_brackets
 from commissioner.records import ReadingNote
 
-DAY_S = 86400
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 INDEX = "__index_level_0__"
@@ -33,7 +32,7 @@ def columns_of(path: Path, file: pa_parquet.ParquetFile) -> tuple[pa.Table, list
         if pa.types.is_temporal(column.type):
             found["time_s" if name == time else name] = _seconds(column)
             continue
-        column = column.cast(pa.float64())
+        column = column.cast(pa.float64(), safe=False)
         if factors := {key: float(text) for key, text in said.items() if is_said(key) and NUMBER.fullmatch(text)}:
             values, more = in_unit(name, column.to_numpy(), factors, str(path))
             column, notes = pa.chunked_array([values]), [*notes, *more]
@@ -49,12 +48,13 @@ def _without_numbers(all_names: list[str], names: list[str], time: str | None) -
 
 
 def _time_among(schema: pa.Schema, names: list[str]) -> str | None:
-    """Of columns of times the one that means the recording's time, or pandas' index; None where a number means it."""
+    """Of columns of times the one that means the recording's time, pandas' index, or the only one; None where a number means it."""
     meant = meanings_of(names)
     stamped = [name for name in names if pa.types.is_temporal(schema.field(name).type)]
     if any(meaning == "time_s" and name not in stamped for name, meaning in meant.items()):
         return None
-    return next((name for name in stamped if meant.get(name) == "time_s" or name == INDEX), None)
+    called = [name for name in stamped if meant.get(name) == "time_s" or name == INDEX]
+    return next(iter(called or stamped if len(stamped) == 1 else called), None)
 
 
 def _seconds(column: pa.ChunkedArray) -> pa.ChunkedArray:

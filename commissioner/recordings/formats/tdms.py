@@ -26,6 +26,8 @@ _TYPES = {
 }  # fmt: skip
 _TEXT, _TIME_STAMP = 0x20, 0x44
 MAX_SEGMENTS = 200_000
+_UNITS = ("unit_string", "ni_unitdescription", "unit", "units")
+"""Properties that name a channel's unit, in any case: LabVIEW's, DAQmx's, and what people write themselves."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +229,6 @@ def _property(part: Stretch, order: str) -> Property:
 def _name(key: str, channel: _Channel) -> str:
     """`/'group'/'channel'` -> `group.channel [unit]`"""
     name = ".".join(part.strip("'").replace("''", "'") for part in key.strip("/").split("'/'"))
-    units = (channel.properties.get(key) for key in ("unit_string", "NI_UnitDescription"))
-    unit = next((one for one in units if one), None)
+    said = {key.lower(): value for key, value in channel.properties.items()}
+    unit = next((said[key] for key in _UNITS if said.get(key)), None)
     return f"{name} [{unit}]" if isinstance(unit, str) and unit else name

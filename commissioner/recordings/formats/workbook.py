@@ -1,4 +1,4 @@
-"""Workbooks of spreadsheets (.xlsx, .xls, .ods): the one sheet that holds a table, as the text a CSV export of it would be.
+"""Workbooks of spreadsheets (.xlsx, .xlsm, .xlsb, .xls, .ods): the one sheet that holds a table, as the text a CSV export of it would be.
 
 Read by calamine (MIT), for it knows all three formats; formulas give the values that were stored with them.
 """
@@ -6,6 +6,7 @@ Read by calamine (MIT), for it knows all three formats; formulas give the values
 from __future__ import annotations
 
 import datetime as dt
+import re
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -19,17 +20,23 @@ from commissioner.recordings.reading.cells import is_number
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
 
-ENDINGS = frozenset({".xlsx", ".xls", ".ods"})
+ENDINGS = frozenset({".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"})
 LEAST_ROWS, LEAST_NUMBERS = 2, 2
 """Rows of so many numbers make a sheet a table; a page of remarks has fewer."""
 _CHUNK = 1 << 20
 MOST_BYTES = 64 * 1024**2
 """Unpacked: 1.3 million cells, each of which becomes an object."""
+_UNSTORED = re.compile(
+    rb'<c\b(?![^>]*\bt="str")[^>]*>\s*<f\b[^>]*(?:/>|>[^<]*</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>'
+    rb"|<table:table-cell\b(?=[^>]*\btable:formula=)(?![^>]*\boffice:value-type=)[^>]*>"
+)
+"""A formula without the value that it gave, as programs write it that do not calculate (XLSX, ODS)."""
 Cells = Sequence[Sequence[Any]]
 
 
 def text_of(path: Path) -> str:
-    """The table's cells between tabs. DataRefused: damaged, locked by a password, too large, or tables on several sheets."""
+    """The table's cells between tabs. DataRefused: damaged, locked by a password, too large, formulas without values, or tables on
+    several sheets."""
     if path.suffix.lower() != ".xls":
         _require_bounded(path)
     sheets = _sheets(path)
@@ -73,18 +80,27 @@ def _opened(path: Path) -> CalamineWorkbook:
 
 
 def _require_bounded(path: Path) -> None:
-    """Unpacks to count: what a workbook says of its own size proves nothing, and a wrong size fails its check sum here."""
-    limit, size = min(MOST_BYTES, unpacked_limit(path)), 0
+    """Unpacks to count: what a workbook says of its own size proves nothing, and a wrong size fails its check sum here.
+    DataRefused also where a formula has no value."""
+    limit, size, unstored = min(MOST_BYTES, unpacked_limit(path)), 0, 0
     try:
         with zipfile.ZipFile(path) as packed:
             for member in packed.infolist():
+                pieces = []
                 with packed.open(member) as file:
                     while piece := file.read(_CHUNK):
                         size += len(piece)
                         if size > limit:
                             raise too_large(path, f"> {limit}", limit)
+                        pieces.append(piece)
+                unstored += len(_UNSTORED.findall(b"".join(pieces))) if member.filename.endswith(".xml") else 0
     except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, NotImplementedError) as error:
         raise _unreadable(path, error) from error
+    if unstored:
+        raise _refused(
+            path, "holds formulas whose values were not stored", f"{unstored} cells", "a value in each cell",
+            "open it in a spreadsheet program and save it there, which calculates it, or save it as CSV",
+        )  # fmt: skip
 
 
 def _is_table(cells: Cells) -> bool:

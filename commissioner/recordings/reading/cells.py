@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from commissioner.errors import DataRefused
+from commissioner.recordings.units import DAY_S
 from commissioner.records import Signal
 
 NOTHING = frozenset(
@@ -25,8 +26,15 @@ GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?: \d{3})+(?:[.,]\d*)?(?:[eEdD][+-]?\d+
 BETWEEN_THOUSANDS = re.compile(r"(?<=\d)['\u2019\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 """An apostrophe, as in Switzerland, or a space that breaks no line."""
 CLOCK = re.compile(
-    r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{2,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2})([.,:]\d+)?(?:Z|[+-]\d{2}:?\d{2})?"
+    r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{2,4})[T ]+)?"
+    r"(?:(\d{1,2}):(?=\d{2}:)|(?=\d{1,2}:\d{2}[.,]\d))(\d{1,2}):(\d{2})([.,:]\d+)?(?: ?([AP])\.?M\.?)?(?:Z|[+-]\d{2}:?\d{2})?",
+    re.IGNORECASE,
 )
+"""A time of day, with a date before it or without; minutes and seconds where a fraction says that they are (`59:59.98`)."""
+
+
+LOOKED_AT, LEAST_GROUPED = 1024, 8
+"""Cells of a column, and how many of them must look like thousands to be asked for: of shortest decimals one in ten has fewer digits."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +114,7 @@ def to_numbers(column: pa.ChunkedArray, marks: Marks, source: str) -> tuple[Sign
     if isinstance(text, pa.ChunkedArray):
         text = text.combine_chunks()
     marks = _of_column(text, marks)
+    _require_decimals(text, marks, source)
     is_grouped = _has(text, re.escape(marks.other))
     if not is_grouped or (marks.thousands and not _has(text, _not_between_thousands(marks.thousands))):
         bare = pc.replace_substring(text, marks.other, "") if is_grouped else text
@@ -121,6 +130,18 @@ def _of_column(text: pa.Array, marks: Marks) -> Marks:
     """The marks of a column that has the other one for its decimals throughout (a time with points beside values with commas)."""
     is_other = not _has(text, re.escape(marks.decimal)) and _has(text, _of_decimals(marks.other))
     return Marks(marks.other) if is_other else marks
+
+
+def _require_decimals(text: pa.Array, marks: Marks, source: str) -> None:
+    """DataRefused: every mark for decimals stands before three digits, and whole numbers below a thousand have none: thousands, as
+    in `954`, `1.012`. Decimals would be written `954.000`, or now and then with fewer digits."""
+    cells = pc.drop_null(text.slice(0, LOOKED_AT))
+    mark = re.escape(marks.decimal)
+    if marks.thousands or _has(cells, rf"[{mark}](?:\d{{0,2}}(?:\D|$)|\d{{4}})|^[+-]?0*[{mark}]|[eEdD:/]"):
+        return
+    grouped = [cell for cell in cells.to_pylist() if _is_grouped(cell, marks.decimal)]
+    if len(grouped) >= LEAST_GROUPED and _has(cells, r"^[+-]?[1-9]\d{0,2}$") and not _has(cells, r"^[+-]?\d{4,}$"):
+        raise _ambiguous(grouped[0], source)
 
 
 def _has(text: pa.Array, pattern: str) -> bool:
@@ -147,7 +168,7 @@ def _one_by_one(text: pa.Array, marks: Marks, source: str) -> tuple[Signal, list
         cell = ungrouped((whole or "").strip().strip('"').strip())
         if cell.lower() in NOTHING:
             continue
-        clock = CLOCK.fullmatch(cell.upper())
+        clock = CLOCK.fullmatch(cell)
         try:
             values[k] = clock_seconds(clock) if clock else _number(cell, marks, source)
         except ValueError:
@@ -171,15 +192,21 @@ def _number(cell: str, marks: Marks, source: str) -> float:
 
 
 def clock_seconds(found: re.Match[str]) -> float:
-    """Seconds of a time of day, since 1970 where a date stands before it (day before month where the year comes last)."""
-    year, month, day, day2, month2, year2, hours, minutes, seconds, fraction = found.groups()
+    """Seconds of a time of day, since 1970 where a date stands before it (day before month where the year comes last, but
+    beside AM and PM)."""
+    year, month, day, day2, month2, year2, hours, minutes, seconds, fraction, half = found.groups()
     days = 0.0
     if year or year2:
         date = (int(year), int(month), int(day)) if year else (int(year2) % 100 + 2000, int(month2), int(day2))
-        if date[1] > 12:
+        if date[1] > 12 or (year2 and half and date[2] <= 12):
             date = (date[0], date[2], date[1])
         days = float(
             (np.datetime64(f"{date[0]:04d}-{date[1]:02d}-{date[2]:02d}") - np.datetime64("1970-01-01")).astype(int)
         )
     part = float("0." + fraction[1:]) if fraction else 0.0
-    return 86400.0 * days + 3600.0 * int(hours) + 60.0 * int(minutes) + int(seconds) + part
+    return DAY_S * days + 3600.0 * _hour(hours, half) + 60.0 * int(minutes) + int(seconds) + part
+
+
+def _hour(hours: str | None, half: str | None) -> int:
+    """Of the day; 12 AM is midnight, 12 PM noon; none where only minutes and seconds are written."""
+    return int(hours or 0) % 12 + 12 * (half.upper() == "P") if half else int(hours or 0)

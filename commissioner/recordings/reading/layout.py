@@ -8,14 +8,17 @@ from dataclasses import dataclass
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_COLUMNS
-from commissioner.recordings.names import meaning_of
+from commissioner.recordings.names import meaning_of, meanings_of
 from commissioner.recordings.reading.cells import is_number, is_numeric, ungrouped
 from commissioner.recordings.reading.preface import SIGNS
-from commissioner.recordings.units import is_unit, read_unit, unit_in
+from commissioner.recordings.sheet_names import sheet_columns
+from commissioner.recordings.units import IN_NAME, is_unit, read_unit, unit_in
 
 MAX_PREFACE_LINES = 400
 LONGEST_LINE = 1 << 16
 SEPARATORS = (";", "\t", ",", " ")
+MOST_BETWEEN = 4
+"""Rows between the names and those next to the numbers: of channels, types, ranges."""
 HEAD_ROWS = 3
 """Rows of numbers in a row, alike, that begin the data; fewer where the file ends."""
 
@@ -81,9 +84,9 @@ def split(line: str, separator: str) -> Row:
 
 
 def _said(line: str, separator: str) -> Row:
-    """The cells of a line above the numbers; of a comment a number whole that its comma would cut (`# rated_current_a: 4,86`)."""
+    """The cells of a line above the numbers; a number behind its key whole that its comma would cut (`# rated_current_a: 4,86`)."""
     cells = split(line.lstrip("# "), separator)
-    if separator != "," or not line.startswith("#"):
+    if separator != ",":
         return cells
     out = cells[:1]
     for cell in cells[1:]:
@@ -169,7 +172,8 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
     if not is_split:
         _require_columns(above[len(above) - used :], rows, source)
     names, units, used = _by_keys(above, width, names, units, used)
-    said = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
+    names, units, used, between = _further_up([_stripped(row, width) for row in above], names, units, used)
+    said = (*above[: len(above) - used], *between, *_beyond(above[len(above) - used :], width))
     return Layout(separator, lines[first].start, names, units, said, 0, is_split and separator == ",")
 
 
@@ -219,12 +223,18 @@ def _by_keys(
 def _keyed(above: Sequence[Row], width: int, keys: frozenset[str]) -> tuple[str, ...]:
     """The cells behind the key of the last such row, one a column: nothing for the first, which stands below the key, unless the
     row names one channel more."""
-    for row in reversed(above):
+    for row in map(_with_its_key, reversed(above)):
         is_before = len(row) == width + 1 and row[-1]
         cells = [*([] if is_before else [""]), *row[1:], *[""] * width][:width]
         if row and _key(row[0]) in keys and len(row) >= width - 1 and any(cells) and not any(":" in c for c in cells):
             return tuple(cells)
     return ()
+
+
+def _with_its_key(row: Row) -> Row:
+    """The row with the key of its first cell in a cell of its own: `Units: s,mA,mA` as `Units,s,mA,mA`."""
+    key, mark, rest = row[0].partition(":") if row else ("", "", "")
+    return [key, rest.strip(), *row[1:]] if mark and rest.strip() else row
 
 
 def _key(cell: str) -> str:
@@ -242,6 +252,38 @@ def _names(above: Sequence[Row], width: int) -> tuple[tuple[str, ...], tuple[str
     if before and _is_units(before) and len(before) >= 2 and not _is_units(last):
         return _padded(last, width), _padded(before, width), 2, width >= 2 * len(last)
     return _padded(last, width), tuple(unit_in(n) for n in _padded(last, width)), 1, width >= 2 * len(last) >= 4
+
+
+def _further_up(
+    rows: Sequence[Row], names: tuple[str, ...], units: tuple[str, ...], used: int
+) -> tuple[tuple[str, ...], tuple[str, ...], int, list[Row]]:
+    """The names of a row above, or of groups over phases (`Current,,` over `U,V,W`), where these mean more columns than the names next
+    to the numbers (a channel's number, its type, a phase alone); the units below them; the rows between, whose keys may say a scale."""
+    width, best, rest = len(names), (names, units, used), list[Row]()
+    for count in range(used + 1, min(len(rows), used + MOST_BETWEEN) + 1) if used else ():
+        row, below = rows[-count], rows[len(rows) - count + 1 :]
+        for found in (_grouped(row, names), _padded(row, width)) if len(row) <= width else ():
+            if _known(found) > max(_known(best[0]), 1):
+                of_row = next((r for r in below if _is_units(r)), [])
+                said = zip(_padded(of_row, width), map(unit_in, found), strict=True)
+                best = found, tuple(own or of_name for own, of_name in said), count
+                rest = [r for r in below if r is not of_row]
+    return *best, rest
+
+
+def _known(names: Sequence[str]) -> int:
+    """How many names mean a column of a recording or of a test sheet."""
+    return len(meanings_of(names).keys() | sheet_columns(names).keys())
+
+
+def _grouped(row: Row, names: Sequence[str]) -> tuple[str, ...]:
+    """Each name behind that of its group, which stands over the first of them (cells that were one) or over each."""
+    group, out = "", []
+    for over, name in zip(_padded(row, len(names)), names, strict=True):
+        group = over or group
+        unit = unit_in(group)
+        out.append(f"{IN_NAME.sub('', group)} {name}" + f" [{unit}]" * bool(unit) if group and name else group or name)
+    return tuple(out)
 
 
 def _stripped(row: Row, width: int) -> Row:

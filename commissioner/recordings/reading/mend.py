@@ -12,16 +12,17 @@ from commissioner.errors import DataRefused
 from commissioner.recordings.names import key_of
 from commissioner.recordings.reading.preface import Clock
 from commissioner.recordings.table import ColumnReading
-from commissioner.recordings.units import read_unit
+from commissioner.recordings.units import DAY_S, read_unit
 from commissioner.records import ReadingNote, Signal
 
 LEAST_ROWS = 16
 _COUNTERS = {"x", "n", "no", "nr", "index", "point", "points", "row", "sample", "samples", "sequence"}
 TIME_MADE = "time_made"
 """Code of the note that the rows were counted by the interval which the file gives."""
-DAY_S = 86400.0
 DATES = ((32874.0, 73051.0), (7.2e5, 7.7e5))
 """Days of the years 1990 to 2099 as Excel counts them, and of 1971 to 2108 as MATLAB does."""
+EPOCH_S = (6.3e8, 4.2e9)
+"""Seconds since 1970 of the years 1990 to 2103."""
 LEAST_STEP_S = 1e-6
 SAME_INTERVAL = 0.02
 LEAST_BACK = 16
@@ -31,12 +32,12 @@ MOST_REPEATED = 50
 
 
 def with_time(columns: dict[str, Signal], clock: Clock) -> list[ReadingNote]:
-    """Makes `time_s` of start and increment where there is none, or where it only counts the rows."""
+    """Makes `time_s` of start and increment where there is none, or no cell of it is a time, or where it only counts the rows."""
     if clock.interval_s is None:
         return []
     time = columns.get("time_s")
     rows = max((v.size for v in columns.values()), default=0)
-    if time is None:
+    if time is None or not np.isfinite(time).any():
         columns["time_s"] = (clock.start_s or 0.0) + clock.interval_s * np.arange(rows, dtype=np.float64)
     elif time.size > 2 and np.all(np.diff(time) == 1.0) and abs(clock.interval_s - 1.0) > 1e-9:
         columns["time_s"] = (clock.start_s or 0.0) + clock.interval_s * time
@@ -110,6 +111,17 @@ def from_days(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[Re
     return {**columns, "time_s": DAY_S * (time - np.floor(time[0]))}, [note]
 
 
+def from_epoch(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """Milli-, micro- or nanoseconds since 1970 without a unit, in seconds since midnight: as seconds they lie 20 000 years ahead."""
+    time = columns.get("time_s")
+    for name, per_second in (("milli", 1e3), ("micro", 1e6), ("nano", 1e9)):
+        if time is not None and time.size and EPOCH_S[0] <= time[0] / per_second < EPOCH_S[1]:
+            day = DAY_S * per_second
+            note = ReadingNote("epoch", f"the time counts {name}seconds since 1970: taken as seconds of the day")
+            return {**columns, "time_s": (time - day * np.floor(time[0] / day)) / per_second}, [note]
+    return dict(columns), []
+
+
 def require_one_block(columns: Mapping[str, Signal], source: str) -> None:
     """DataRefused: the time begins again inside a segment, where another recording stands below the first."""
     time = columns["time_s"]
@@ -136,7 +148,7 @@ def with_running_time(
         return dict(columns), []
     step, interval = _printing_step(time), clock.interval_s
     made = None if interval is None else time[0] + interval * np.arange(time.size, dtype=np.float64)
-    if made is None or np.ptp(time - made) > 2.0 * step:
+    if made is None or (step > 0.0 and np.ptp(time - made) > 2.0 * step):
         stamps = np.unique(time).size
         raise DataRefused(
             f"{source}: the time stands still from row to row", step="read the time",

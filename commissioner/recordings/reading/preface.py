@@ -23,6 +23,8 @@ RATE = frozenset(
 )  # fmt: skip
 START = frozenset({"start", "t0", "starttime", "xzero", "xorigin", "x0", "hoffset"})
 VALUE = re.compile(r"(?:[A-Za-z]+:)?\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s].*)?")
+_THOUSANDS = re.compile(r"\s*[1-9]\d{0,2}(?:,\d{3})+(?![\d.,])")
+_POINTED = re.compile(r"\s*[1-9]\d{0,2}(?:\.\d{3})+(?![\d.,])")
 SIGNS = re.compile(r"^([^:=]{1,60})[:=]\s*(.+)$")
 
 
@@ -54,11 +56,12 @@ def pairs(rows: Iterable[Sequence[str]]) -> list[tuple[str, str, str]]:
     return found
 
 
-def clock_in(said: Iterable[tuple[str, str, str]]) -> Clock:
-    """The first interval or rate that is said, with its unit (seconds and hertz where none stands)."""
+def clock_in(said: Iterable[tuple[str, str, str]], decimal: str = ".") -> Clock:
+    """The first interval or rate that is said, with its unit (seconds and hertz where none stands); none that may be thousands by the
+    decimal mark of the file."""
     interval, start, by = None, None, ""
     for name, value, unit in said:
-        number = seconds(name, value, unit)
+        number = None if decimal == "," and _POINTED.match(value) else seconds(name, value, unit)
         if number is None:
             continue
         if key(name) in START:
@@ -71,7 +74,10 @@ def clock_in(said: Iterable[tuple[str, str, str]]) -> Clock:
 
 
 def seconds(name: str, value: str, unit: str) -> float | None:
-    """The number in seconds (or hertz, of a rate); None where it is none, or its unit is not one of time or rate."""
+    """The number in seconds (or hertz, of a rate); None where it is none, may be thousands (`5,000 Hz`), or its unit is not one of
+    time or rate."""
+    if _THOUSANDS.match(value):
+        return None
     text = value.replace(",", ".") if value.count(",") == 1 and "." not in value else value
     found = VALUE.fullmatch(text.strip())
     if not found or not math.isfinite(number := float(found[1])):
