@@ -88,7 +88,7 @@ def judge_drive(
             f"at least {SMALLEST_DRIVE * test_current_a:.3g} A peak",
             "lower limits.current_fraction or use a larger drive",
         ),
-        *_keeps_up(pace, identity.control_period_s),
+        *keeps_up(pace, identity.control_period_s),
         *_same_motor(drive_nameplate, nameplate),
     )
 
@@ -156,28 +156,33 @@ def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[C
     )
 
 
-def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[CheckResult]:
+def keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[CheckResult]:
     """One window is asked for at a time: where it takes longer than its samples last, a sample must be less, or kept in the
     drive (`link_plan`)."""
     if pace is None:
         return
     plan = plan_link(pace, sample_period_s)
     is_kept = plan is None or pace.is_kept(plan, sample_period_s)
-    slow = f" at best, {1e3 * pace.slowest_s:.3g} ms at worst" if pace.slowest_s > UNEVEN * pace.round_trip_s else ""
+    took = [f"{1e3 * pace.round_trip_s:.3g} ms for {pace.samples} samples"]
+    if pace.slowest_s > UNEVEN * pace.round_trip_s:
+        took.append(f"{1e3 * pace.slowest_s:.3g} ms at worst")
     if not pace.can_steer:
-        slow += f", {1e3 * pace.request_s:.3g} ms for the shortest request,"
-    took, rate = (
-        f"{1e3 * pace.round_trip_s:.3g} ms{slow} for {pace.samples} samples",
-        f"{1.0 / sample_period_s:.0f} samples a second",
-    )
-    limit = f"at most {1e3 * pace.samples * sample_period_s:.3g} ms: the drive takes {rate}"
+        took.append(f"{1e3 * pace.request_s:.3g} ms for the shortest request")
+    limit = [
+        f"at most {1e3 * pace.samples * sample_period_s:.3g} ms: the drive takes {1.0 / sample_period_s:.0f} samples a second"
+    ]
+    if plan is not None and plan.is_reduced:
+        took.append(plan.sentence(sample_period_s))
+    if plan is None or plan.is_reduced:
+        limit += [
+            "slower with means, or with samples kept in the drive",
+            f"{1e3 * LONGEST_REQUEST_S:.3g} ms for a short request",
+        ]
     yield CheckResult(
         "the link keeps up with the samples",
         plan is not None and is_kept,
-        took if plan is None or not plan.is_reduced else f"{took}: {plan.sentence(sample_period_s)}",
-        limit
-        if plan is not None and not plan.is_reduced
-        else f"{limit}; slower with means, or with samples kept in the drive; {1e3 * LONGEST_REQUEST_S:.3g} ms for a short request",
+        "; ".join(took),
+        "; ".join(limit),
         "use a link that answers sooner and evenly: a cable in place of radio, VPN or gateway; a serial line of "
         f"{least_baud(pace, sample_period_s, is_reduced=plan is None):.0f} Bd or more",
     )

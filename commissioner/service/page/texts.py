@@ -69,10 +69,12 @@ class Texts:
         return self.gettext(message) % facts
 
     def tell(self, text: object) -> str:
-        """A word or sentence of the core, its values among it: never a format, never markup."""
+        """A word or sentence of the core, its values among it, or several after one another: never a format, never markup."""
         said = str(text)
         if (whole := self._catalogue.messages.get(said)) is not None:
             return whole
+        if len(parts := said.split("; ")) > 1 and all(map(self.knows, parts)):
+            return "; ".join(map(self.tell, parts))
         for pattern, translation in self._catalogue.sentences:
             if (found := pattern.fullmatch(said)) is not None:
                 return translation % {name: self._value(value) for name, value in found.groupdict().items()}

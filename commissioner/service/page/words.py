@@ -142,6 +142,6 @@ class Words:
             return said
         text = re.sub(r"(\d)\s*%", rf"\1{NBSP}%", text.replace("degC", "°C"))
         text = re.sub(r"(\d) (?=[A-Za-z°])", rf"\1{NBSP}", text)
-        for english in ("at most", "at least", "of the peak", "peak", "to"):
+        for english in ("at most", "at least", "near", "of the peak", "peak", "to"):
             text = re.sub(rf"\b{english}\b", self._t.gettext(english), text)
         return re.sub(r"(\d)\.(\d)", r"\1,\2", text) if self._t.language == "de" else text

@@ -12,6 +12,8 @@ from jinja2.ext import extract_from_ast
 import commissioner
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.link.files.drive_file import known_drives, load_profile
+from commissioner.procedure.checks import keeps_up
+from commissioner.procedure.link_plan import StreamPace
 from commissioner.procedure.tuned import TuneVerdict
 from commissioner.service.page import band, frame, texts, words
 from commissioner.service.page.texts import Texts
@@ -19,7 +21,7 @@ from commissioner.service.simulator import SCENARIOS
 
 PRODUCT = Path(commissioner.__file__).parent
 PAGE = PRODUCT / "service" / "page"
-SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py",
+SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py", "run/inspection.py",
         "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
@@ -136,6 +138,34 @@ def test_every_sentence_of_checks_guards_and_refusals_has_its_translation():
         {f"{place}: {text}" for place, text in core_sentences() if not german.knows(text.removesuffix(", degC"))}
     )
     assert missing == []
+
+
+def of_checks():
+    """What every check may show as seen and as its limit."""
+    for file in ("procedure/checks.py", "run/inspection.py"):
+        for node in ast.walk(ast.parse((PRODUCT / file).read_text("utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "CheckResult":
+                yield from (text for argument in node.args[2:4] for text in shown(argument))
+    for pace in (
+        StreamPace(0.0005, 29, 120, 80, slowest_s=0.02, kept_samples=400),
+        StreamPace(0.0072, 29, 120, 80, most_averaged=8),
+        StreamPace(0.012, 29, 120, 80, most_averaged=8),
+        StreamPace(0.08, 29, 120, 80, most_averaged=40, kept_samples=20000),
+        StreamPace(3.0, 29, 120, 80, most_averaged=8, request_s=0.15),
+    ):
+        for check in keeps_up(pace, 2e-4):
+            yield from (str(check.value), str(check.limit))
+
+
+def test_what_a_check_saw_and_its_limit_are_told_in_german():
+    german = words.Words(Texts("de"))
+    kept = {}
+    for text in of_checks():
+        told = german.check_value({"name": "", "value": text}), german.check_limit({"name": "", "limit": text})
+        english = set(re.findall(r"[a-zA-Z]{3,}", text)) - {"rad", "negative"}  # words of both languages
+        kept[text] = [english & set(re.findall(r"[a-zA-Z]{3,}", german)) for german in told]
+    assert len(kept) > 15
+    assert {text: left for text, left in kept.items() if all(left)} == {}
 
 
 def test_what_is_said_of_a_drives_own_tuning_has_its_translation():
