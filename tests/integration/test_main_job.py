@@ -292,10 +292,10 @@ def test_a_motor_that_would_pass_the_flux_limit_is_held_back_in_truth(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["0k18_small_inverter", "15k_hard"])
-def test_another_motor_behind_another_inverter_is_commissioned_as_well(name, tmp_path):
-    """A short version, one axis, of `python -m tests.campaigns.combinations`, which has 18."""
+def test_another_motor_behind_another_inverter_is_commissioned_as_well(name, tmp_path, is_short):
+    """A short version, by day along one axis, of `python -m tests.campaigns.combinations`, which has 18."""
     case = next(case for case in CASES if case.name == name)
-    outcome = run_case(case, tmp_path, arguments=("--axes", "0"))
+    outcome = run_case(case, tmp_path, arguments=("--axes", "0") if is_short else ())
     assert outcome.ended == "commissioned", outcome.reason
     for parameter, percent in outcome.errors_percent.items():
         assert abs(percent) < 3.0, parameter
