@@ -179,7 +179,7 @@ def read_toml(path: Path) -> JsonObject:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # syntax, encoding, digits without end, nesting without end
         raise ConfigurationError(
-            file=str(path), key="(syntax)", value=str(error), expected="valid TOML in UTF-8" + _decimal_comma(text)
+            file=str(path), key="syntax", value=str(error), expected="valid TOML in UTF-8" + _decimal_comma(text)
         ) from error
 
 

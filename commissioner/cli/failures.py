@@ -55,7 +55,7 @@ def _carried_out(app: typer.Typer, arguments: Sequence[str]) -> CommissionerErro
     except KeyboardInterrupt:
         error = _stopped(arguments)
     except typer.Abort:
-        error = _stopped(arguments, by="the answer no, or none")
+        error = _unanswered(arguments)
     except CommissionerError as failure:
         error = failure
     except OSError as failure:
@@ -94,6 +94,17 @@ def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
 def _stopped(arguments: Sequence[str], by: str = "Ctrl-C or SIGTERM") -> CommissionerError:
     again = "the same call with --resume goes on" if "study" in arguments[:1] else "start again when ready"
     return Aborted("stopped by the operator", step=_verb(arguments), value=by, limit="no stop", remedy=again)
+
+
+def _unanswered(arguments: Sequence[str]) -> CommissionerError:
+    """A question whose line still stands open: Ctrl-C, or the end of what is typed."""
+    typer.echo(err=True)
+    if sys.stdin is not None and sys.stdin.isatty():
+        return _stopped(arguments, by="no answer")
+    return Aborted(
+        "nobody answered", step=_verb(arguments), value="the end of the input", limit="an answer",
+        remedy="call it from a terminal; where nobody sits at one, `--yes` answers for those verbs that have it",
+    )  # fmt: skip
 
 
 def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:

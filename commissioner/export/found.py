@@ -56,8 +56,9 @@ def found_in(result: Mapping[str, Any], plate: Mapping[str, Any], utc: str) -> F
     parameters = result.get("parameters") or {}
     if result.get("outcome") != "commissioned" or not parameters:
         raise DataRefused(
-            f"{result.get('run')} has no accepted parameters", step="export", value=result.get("outcome"), limit="commissioned",
-            remedy="export its samples instead (--form samples), or another run",
+            f"{result.get('run')} has no accepted parameters", step="export",
+            value=f"{result.get('outcome')}, {'four' if parameters else 'no'} parameters", limit="commissioned, four parameters",
+            remedy="export another run, or this one's samples (--form samples) where it has some",
         )  # fmt: skip
     model, inverter, delay = result["t_model"], result.get("inverter") or {}, result.get("delay_s")
     return Found(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commissioner.history.series import FALSE_ALARM, Array, Judged, judge
+from commissioner.history.series import FALSE_ALARM, LEAST, Array, Judged, judge
 from commissioner.identify.estimate.axes import TEMPERATURE_K, scatter
 from commissioner.identify.estimate.common_ground import CommonGround, Result, at_one_flux, at_temperature
 from commissioner.motor.circuit import PARAMETERS, QUANTILE
@@ -193,6 +193,8 @@ def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
             said.append(
                 f"alarm: the newest {spoken} is {trend.alarm_distance:+.1f} standard errors off, beyond {trend.alarm_threshold:.1f}"
             )
+    if not said and max((len(trend.points) for trend in trends), default=0) < LEAST:
+        return (f"fewer than {LEAST} points: levels only, nothing can be said of a change",)
     if not said:
         said.append("nothing has changed beyond error")
     said.append(f"a motor without any change gets one of these sentences with a chance of at most {false_alarm:g}")

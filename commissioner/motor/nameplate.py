@@ -196,11 +196,19 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
     synchronous_rpm = 60.0 * plate.rated_frequency_hz / plate.pole_pairs
     most = LARGEST_SLIP_OF_MORE_W[1] if plate.rated_power_w > LARGEST_SLIP_OF_MORE_W[0] else LARGEST_SLIP
     if not 0.0 < plate.rated_slip < most:
+        # the pole pairs of a speed are the most whose synchronous speed still lies above it
+        pairs = math.ceil(60.0 * plate.rated_frequency_hz / plate.rated_speed_rpm) - 1
+        fits = pairs > 0 and 1.0 - plate.rated_speed_rpm * pairs / (60.0 * plate.rated_frequency_hz) < most
         yield PlateProblem(
             "rated_speed_rpm",
             plate.rated_speed_rpm,
             f"below the synchronous {synchronous_rpm:.0f} 1/min of {plate.pole_pairs} pole pairs at "
-            f"{plate.rated_frequency_hz:g} Hz by at most {most:.0%}: speed, frequency (50 or 60 Hz) and pole pairs of one line",
+            f"{plate.rated_frequency_hz:g} Hz by at most {most:.0%}: speed, frequency (50 or 60 Hz) and pole pairs of one line"
+            + (
+                f" ({plate.rated_speed_rpm:g} 1/min at {plate.rated_frequency_hz:g} Hz is of {pairs} pole pairs)"
+                if fits
+                else ""
+            ),
         )
     input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
     efficiency = plate.rated_power_w / input_w

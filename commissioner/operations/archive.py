@@ -79,7 +79,7 @@ def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exp
     if recording is None:
         raise DataRefused(
             f"{summary.run} holds no samples", step="export", value=0, limit="at least one block",
-            remedy="the motor was never energised in it",
+            remedy="nothing was sampled: the motor was never energised, or the drive tuned itself",
         )  # fmt: skip
     write_table(out, columns(recording), plate | {"sample_period_s": recording.sample_period_s, "run": summary.run})
     return Exported(summary.run, str(out), int(recording.time_s.size), tuple(verified.losses))

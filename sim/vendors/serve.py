@@ -1,12 +1,13 @@
 """`python -m sim.vendors.serve NAME`: an ordinary drive on Modbus TCP, its keypad on standard input, its answer key at the end.
 
-Keypad: a line each of `tune`, `remote`, `off-on`. Serves until SIGTERM or the end of standard input with `--until-eof`.
+Keypad: a line each of `tune`, `remote`, `off-on`. Serves until SIGTERM.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import selectors
 import signal
 import socket
@@ -47,14 +48,21 @@ def _serve(drive: VendorDrive, port: int, turnaround_s: float) -> None:
     listener = socket.create_server(("127.0.0.1", port))
     sys.stdout.write(f"listening tcp 127.0.0.1:{listener.getsockname()[1]}\n")
     sys.stdout.flush()
-    with selectors.DefaultSelector() as ready:
+    with selectors.SelectSelector() as ready:  # takes /dev/null and files too, which epoll refuses
         ready.register(listener, selectors.EVENT_READ, "new")
-        if not sys.stdin.closed and sys.stdin.isatty() is False:
+        if _has_keypad():
             ready.register(sys.stdin, selectors.EVENT_READ, "key")
         while not stopped:
             for key, _ in ready.select(0.05):
                 _one(drive, ready, key, listener, turnaround_s)
     listener.close()
+
+
+def _has_keypad() -> bool:
+    """Standard input is there; of a terminal only in its foreground: what is typed there is else the shell's."""
+    if sys.stdin is None or sys.stdin.closed:
+        return False
+    return not sys.stdin.isatty() or not hasattr(os, "tcgetpgrp") or os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
 
 
 def _one(

@@ -7,7 +7,7 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 from rich.console import Console
 from rich.markup import escape
@@ -91,13 +91,21 @@ def text(value: object, longest: int = LONGEST) -> str:
     return escape(cut(value, longest))
 
 
-def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, right: Iterable[int] = ()) -> Table:
-    """A rich table; `right` lists the columns that hold numbers."""
+def table(
+    title: str,
+    header: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    right: Iterable[int] = (),
+) -> Table:
+    """A rich table; `right` lists the columns that hold numbers. A word wider than its column goes on in the next line: nothing
+    is cut off."""
     made = Table(
         title=title or None, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
     )
     for index, name in enumerate(header):
-        made.add_column(name, justify="right" if index in set(right) else "left", no_wrap=index == 0)
+        side: Literal["left", "right"] = "right" if index in set(right) else "left"
+        made.add_column(name, justify=side, no_wrap=index == 0, overflow="ellipsis" if index == 0 else "fold")
     for row in rows:
         made.add_row(*row)
     return made
@@ -176,7 +184,7 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             out.print(
                 "  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones"
             )
-    out.print(f"  energised {seconds(document['energised_s'])} in all")
+    out.print(f"  energised {seconds(document['energised_s'], ' in all')}")
 
 
 def losses(run: str, found: Sequence[Loss]) -> None:
@@ -186,9 +194,9 @@ def losses(run: str, found: Sequence[Loss]) -> None:
         err.print(f"[red]damaged[/] {escape(what)}; `commissioner runs verify {escape(run)}` says all", soft_wrap=True)
 
 
-def seconds(energised_s: float | None) -> str:
+def seconds(energised_s: float | None, of: str = "") -> str:
     """How long the motor was energised; a drive that tuned itself, or a run that was cut off, does not say it."""
-    return "not known" if energised_s is None else f"{energised_s:.1f} s"
+    return "for how long is not known" if energised_s is None else f"{energised_s:.1f} s{of}"
 
 
 def _rows(document: Mapping[str, Any], done: str) -> Iterable[Sequence[str]]:

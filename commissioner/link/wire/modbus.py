@@ -47,6 +47,12 @@ _GATEWAY = (
     "the gateway answers and the drive behind it does not: check that device={device} is the drive's number, the gateway's "
     "table, its baud rate and parity, and the drive's supply"
 )
+_OTHER_FILE = (
+    "the drive does not know these registers of the drive file: see that the file is this drive's, else name its own by "
+    "--profile (`commissioner drives list`)"
+)
+READ_REMEDIES = dict.fromkeys((1, 2, 3), _OTHER_FILE)
+"""A drive that will not read what its file describes is another one."""
 REMEDIES = {
     5: "it stays at work longer than an answer may take: let its job end, then start again",
     6: "it stays busy: let what occupies it end, or disconnect the other master, then start again",
@@ -399,12 +405,17 @@ class ModbusPort:
     def _refused(self, what: str, code: int) -> NoReturn:
         self.stats.refusals += 1
         meaning = self._exceptions.get(code, "a code the drive file does not explain")
+        remedies = (
+            REMEDIES | READ_REMEDIES
+            if what.startswith("read ") and meaning == EXCEPTION_MEANINGS.get(code)
+            else REMEDIES
+        )
         raise RequestRefused(
             f"the drive refused to {what}: exception {code}, {meaning}",
             step=what,
             value=code,
             limit="a request the drive allows now",
-            remedy=REMEDIES.get(code, "the drive says: {meaning}").format(meaning=meaning, device=self._device),
+            remedy=remedies.get(code, "the drive says: {meaning}").format(meaning=meaning, device=self._device),
         )
 
 

@@ -27,7 +27,7 @@ def result_of(run: RunSummary) -> Result:
     """A run's combined result as its document holds it. DataRefused: it identified nothing."""
     if not has_result(run):
         raise DataRefused(
-            f"{run.run} identified nothing", step="compare", value=run.outcome, limit="a run with parameters",
+            f"{run.run} identified nothing", step="compare", value=f"{run.outcome}, no parameters", limit="a run with parameters",
             remedy="compare runs of which `commissioner runs show RUN` shows the four parameters",
         )  # fmt: skip
     result = result_from(run.result or {}, run.run)

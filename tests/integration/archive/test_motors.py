@@ -105,6 +105,20 @@ def test_an_unchanged_motor_has_no_trend_whatever_its_temperature_and_flux(tmp_p
     assert "nothing has changed beyond error" in found.sentences
 
 
+def test_a_trend_of_nothing_says_so(tmp_path, capsys):
+    code, document = leave(capsys, "runs", "trend", "--runs", tmp_path)
+    assert (code, document["error"]["value"]) == (2, "neither")
+
+
+@pytest.mark.parametrize(("runs", "is_told"), [(1, False), (2, False), (3, True)])
+def test_fewer_than_three_runs_are_no_verdict_on_a_change(tmp_path, runs, is_told):
+    for k in range(runs):
+        add(tmp_path, k, noisy(k), tag="PUMP-3")
+    sentences = trend(Archive(tmp_path), "PUMP-3").found.sentences
+    assert ("nothing has changed beyond error" in sentences) == is_told
+    assert any("fewer than 3 points" in said for said in sentences) != is_told
+
+
 def test_a_rotor_that_breaks_is_a_step_of_its_resistance_alone_with_picture(tmp_path, capsys):
     for k in range(10):
         machine = noisy(k)

@@ -134,9 +134,10 @@ def test_a_refusal_is_an_answer_and_is_not_repeated():
         port = connect(device)
         port.read_retries = 5
         device.script = lambda request, frame: [refusal(request, frame, 2)]
-        with pytest.raises(RequestRefused, match="illegal data address"):
+        with pytest.raises(RequestRefused, match="illegal data address") as caught:
             port.read(100, 1)
         port.close()
+    assert "--profile" in caught.value.remedy and "drives list" in caught.value.remedy
     assert len(device.bank.requests) == 1
 
 

@@ -1,6 +1,9 @@
 """`tune` as a user calls it: the command line, TCP, an emulated drive in its own process, and its answer key afterwards."""
 
 import json
+import socket
+import subprocess
+import sys
 import time
 from contextlib import closing
 
@@ -20,15 +23,35 @@ def tune(drive, runs, *more, profile="schneider_atv340"):
     )  # fmt: skip
 
 
+def test_an_ordinary_drive_serves_without_a_keypad():
+    """A build server's standard input is /dev/null, which epoll does not take."""
+    command = [sys.executable, "-m", "sim.vendors.serve", "danfoss_fc302"]
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+    ) as drive:
+        assert drive.stdout is not None
+        port = int(drive.stdout.readline().rpartition(":")[2])
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as line:
+            line.sendall(bytes.fromhex("000100000006010304000001"))
+            assert line.recv(64)[:2] == b"\x00\x01"
+        drive.terminate()
+        answer_key = json.loads(drive.stdout.read().splitlines()[-1])
+    assert answer_key["tunings"] == []
+
+
 def test_a_remote_tuning_is_kept_and_taken_back_by_restore(tmp_path):
     with Vendor("schneider_atv340", "--tuning-s", "0.6") as drive:
         answer = tune(drive, tmp_path, "--hardwired-stop", "--write-back")
+        exported = call(
+            "runs", "export", "last", str(tmp_path / "p.json"), "--form", "json", "--runs", str(tmp_path), "--json"
+        )
         restored = call("restore", "last", "--runs", str(tmp_path), "--yes", "--json")
     assert answer.code == 0, answer.stdout
     result = answer.json
     assert result["outcome"] == "commissioned" and len(result["tune"]["repeats"]) == 3
     assert result["tune"]["in_the_drive"].startswith("new")
     assert "tuning: proved on no physical drive yet" in result["remarks"]
+    assert exported.code == 3 and exported.json["error"]["value"] == "commissioned, no parameters"
     assert result["energised_s"] is None  # the drive did it, and does not say how long
     assert restored.code == 0 and restored.json["outcome"] == "restored"
     assert [t["end"] for t in drive.truth["tunings"]] == ["done"] * 3

@@ -1,6 +1,7 @@
 """Every verb's failure is one sentence with step, value, limit and remedy, one document with --json, and its exit code."""
 
 import contextlib
+import io
 import json
 import os
 import pathlib
@@ -10,6 +11,7 @@ import time
 
 import pytest
 import typer
+from rich.console import Console
 
 from commissioner.cli import failures
 from commissioner.cli.app import app
@@ -331,3 +333,30 @@ def test_a_drive_with_a_test_mode_can_be_played_another_cannot(capsys, tmp_path)
     assert [code for code, _ in played] == [0, 0, 0] and len({done["samples"] for _, done in played}) == 1
     code, refused = leave(capsys, "simulate", "danfoss_fc302", "--out", tmp_path / "y.csv")
     assert (code, refused["error"]["limit"]) == (2, "a drive with the capability `excite`, or a motor")
+
+
+def test_a_question_that_nobody_can_answer_says_how_to_answer_it(monkeypatch, capsys):
+    """With the input at its end the remedy is a terminal or --yes, not to try again."""
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    asking = typer.Typer()
+    asking.command()(lambda: typer.confirm("Energise?"))
+    with pytest.raises(SystemExit) as left:
+        run_to_exit(asking, [])
+    told = capsys.readouterr().err
+    assert left.value.code == 4
+    assert "nobody answered" in told and "--yes" in told
+
+
+def test_a_time_that_nobody_knows_is_said_so_and_a_known_one_in_seconds():
+    assert screen.seconds(46.94, " in all") == "46.9 s in all"
+    assert screen.seconds(None, " in all") == "for how long is not known"
+
+
+def test_a_list_loses_no_letter_of_a_word_wider_than_its_column(capsys):
+    row = ("20261128-163213-schneider_atv340-3d243a", "✓ commissioned, restored since", "SIM-INV-7A #20250117")
+    narrow = Console(width=60, file=io.StringIO())
+    narrow.print(screen.table("", ("run", "outcome", "drive"), [row]))
+    assert isinstance(narrow.file, io.StringIO)
+    shown = narrow.file.getvalue()
+    assert "…" not in shown and row[0] in shown
+    assert sorted("".join(shown.split())) == sorted("".join(("run", "outcome", "drive", *row)).replace(" ", ""))

@@ -58,6 +58,17 @@ def test_an_impossible_plate_names_the_key(change, key):
     assert problems[0].expected
 
 
+@pytest.mark.parametrize(
+    ("pole_pairs", "rpm", "pairs"),
+    [(2, 960.0, 3), (2, 2890.0, 1), (2, 720.0, 4), (1, 1436.0, 2), (4, 1436.0, 2), (1, 1000.0, 0), (1, 3600.0, 0)],
+)
+def test_a_speed_of_other_pole_pairs_says_of_which(pole_pairs, rpm, pairs):
+    """3000, 1500, 1000, 750 1/min at 50 Hz; 1000 itself and 3600 are of none."""
+    (problem,) = check(dataclasses.replace(PLATE, pole_pairs=pole_pairs, rated_speed_rpm=rpm))
+    assert (f"is of {pairs} pole pairs" if pairs else "pole pairs of one line") in problem.expected
+    assert ("1/min at 50 Hz is of" in problem.expected) == bool(pairs)
+
+
 IE5_4_POLES = {120: 0.743, 370: 0.843, 1100: 0.895, 4000: 0.928, 15000: 0.954, 75000: 0.970, 200000: 0.974}
 """IEC TS 60034-30-2 at 1500 1/min."""
 

@@ -12,6 +12,7 @@ from jinja2.ext import extract_from_ast
 import commissioner
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.link.files.drive_file import known_drives, load_profile
+from commissioner.link.wire.modbus import READ_REMEDIES, REMEDIES
 from commissioner.procedure.checks import keeps_up
 from commissioner.procedure.link_plan import StreamPace
 from commissioner.procedure.tuned import TuneVerdict
@@ -138,6 +139,12 @@ def test_every_sentence_of_checks_guards_and_refusals_has_its_translation():
         {f"{place}: {text}" for place, text in core_sentences() if not german.knows(text.removesuffix(", degC"))}
     )
     assert missing == []
+
+
+def test_what_to_do_about_each_refused_request_has_its_translation():
+    german = Texts("de")
+    remedies = {remedy.format(device=7) for table in (REMEDIES, READ_REMEDIES) for remedy in table.values()}
+    assert {remedy for remedy in remedies if not german.knows(remedy)} == set()
 
 
 def of_checks():

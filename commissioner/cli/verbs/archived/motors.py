@@ -46,7 +46,7 @@ def show_trend(archive: Archive, motor: str | None, baseline: Path | None, out: 
     """Of a motor's parameters, or of the indicators in a baseline of `monitor`."""
     if (motor is None) == (baseline is None):
         raise UsageError(
-            "a trend is of a motor or of a baseline", step="command line", value=f"{motor} and {baseline}", limit="one of them",
+            "a trend is of a motor or of a baseline", step="command line", value="neither" if motor is None else "both", limit="one of them",
             remedy="give MOTOR, or --baseline FILE",
         )  # fmt: skip
     with screen.busy("comparing over the years"):

@@ -44,7 +44,9 @@ def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
          screen.text(row.person), row.holds)
         for row in found.rows
     ]  # fmt: skip
-    screen.out.print(screen.table("", ("run", "outcome", "motor", "drive", "person", "holds"), rows))
+    header = ("run", "outcome", "motor", "drive", "person", "holds")
+    told = len(header) if any(row[-1] for row in rows) else len(header) - 1
+    screen.out.print(screen.table("", header[:told], [row[:told] for row in rows]))
     if (more := found.total - len(rows)) > 0:
         screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
 
