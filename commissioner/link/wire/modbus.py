@@ -53,6 +53,8 @@ _OTHER_FILE = (
 )
 READ_REMEDIES = dict.fromkeys((1, 2, 3), _OTHER_FILE)
 """A drive that will not read what its file describes is another one."""
+READING = frozenset({3, 4})
+"""Function codes that read registers."""
 REMEDIES = {
     5: "it stays at work longer than an answer may take: let its job end, then start again",
     6: "it stays busy: let what occupies it end, or disconnect the other master, then start again",
@@ -322,7 +324,7 @@ class ModbusPort:
         self.stats.latencies_s.append(self._answered_s - start)
         self._expect(what, (reply.dev_id, reply.function_code & 0x7F), (self._device, shape[0]))
         if reply.isError():
-            self._refused(what, reply.exception_code)
+            self._refused(what, reply.exception_code, is_read=shape[0] in READING)
         return reply
 
     def _words(self, reply: ModbusPDU, count: int, what: str) -> Words:
@@ -402,14 +404,10 @@ class ModbusPort:
             )
         return f"{where}; an answer that needs longer gets it by reply=SECONDS in the address"
 
-    def _refused(self, what: str, code: int) -> NoReturn:
+    def _refused(self, what: str, code: int, *, is_read: bool) -> NoReturn:
         self.stats.refusals += 1
         meaning = self._exceptions.get(code, "a code the drive file does not explain")
-        remedies = (
-            REMEDIES | READ_REMEDIES
-            if what.startswith("read ") and meaning == EXCEPTION_MEANINGS.get(code)
-            else REMEDIES
-        )
+        remedies = REMEDIES | READ_REMEDIES if is_read and meaning == EXCEPTION_MEANINGS.get(code) else REMEDIES
         raise RequestRefused(
             f"the drive refused to {what}: exception {code}, {meaning}",
             step=what,
