@@ -127,7 +127,8 @@ def resistance_meaning(name: str) -> str | None:
 def _first(name: str, told: Callable[[str], str | None]) -> str | None:
     """What the first reading of a name, without its unit, tells."""
     bare = _OHM_ENDING.sub("", IN_NAME.sub("", name).strip())
-    return next((found for reading in readings(bare) if (found := told(key_of(reading)))), None)
+    spelt = (*readings(bare), *readings(name))  # the V of `R_V` is a phase
+    return next((found for reading in spelt if (found := told(key_of(reading)))), None)
 
 
 def _of_one_winding(key: str) -> str | None:

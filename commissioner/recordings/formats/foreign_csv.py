@@ -22,7 +22,7 @@ from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
-from commissioner.recordings.reading.said_tests import codes, is_title, unknown
+from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
 from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
 
@@ -114,10 +114,11 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     for name, column in zip(layout.names, table.columns, strict=True):
         values, wrong = to_numbers(column, marks, source)
         filled += np.isfinite(values)
-        cells = [str(cell) for cell in column.to_pylist()] if is_title(name) else []
-        said = codes(cells)
+        is_said = is_title(name) or (meaning_of(name) == "segment" and not np.isfinite(values).any())
+        cells = [str(cell) for cell in column.to_pylist()] if is_said else []
+        said = codes(cells) if is_title(name) else in_runs(cells)
         columns.append(values if said is None else said)
-        notes += () if said is None else unknown(cells, said)
+        notes += unknown(cells, said) if said is not None and is_title(name) else ()
         if said is None and meaning_of(name) != "time_s" and any(map(_STATISTIC.fullmatch, wrong)):
             below |= [_STATISTIC.fullmatch(str(cell).strip()) is not None for cell in column.to_pylist()]
         if wrong and said is None and np.isfinite(values).any() and meaning_of(name) != "time_s":
