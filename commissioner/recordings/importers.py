@@ -41,7 +41,7 @@ from commissioner.recordings.reading.mend import (
     without_empty_columns,
     without_untimed_rows,
 )
-from commissioner.recordings.reading.preface import Clock, clock_in
+from commissioner.recordings.reading.preface import Clock, clock_in, factors_said
 from commissioner.recordings.reading.recognise import Recognised, quantity, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
 from commissioner.recordings.sheet_names import is_sheet
@@ -237,7 +237,8 @@ def _of_table(table: Table, mapping: ChannelMap) -> Table:
     clock = clock_in((k, str(v), "") for k, v in table.metadata.items())
     period = table.metadata.get("sample_period_s")
     clock = replace(clock, interval_s=period, said_by="sample_period_s") if isinstance(period, float) else clock
-    return _table(found, table.metadata, clock, mapping, table.source, ())
+    notes = factors_said([[key, str(value)] for key, value in table.metadata.items()])
+    return _table(found, table.metadata, clock, mapping, table.source, (*table.notes, *notes))
 
 
 def _of_text(path: Path, mapping: ChannelMap) -> Table:

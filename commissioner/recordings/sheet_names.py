@@ -32,7 +32,7 @@ SHEET = {
         rf"{_AMPS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:current|amps|strom|courant)|strangstrom"
     ),
     "power_w": re.compile(
-        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)power|powerinput|inputwatts"
+        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)+power(?:total)?|powerinput|inputwatts"
     ),
 }  # fmt: skip
 """Line values, values of one phase, and the power of all phases. Values of each phase (`I_u`, `U_12`) are a recording's columns."""

@@ -194,7 +194,7 @@ def to_standstill(table: Table) -> StandstillRecording:
             table.source,
             "no measurement is in this file: neither samples over time, nor test points, nor a maker's rated values",
             ", ".join([*columns, *table.metadata][:12]) or "no column",
-            "time_s, currents and voltages; or frequency_hz, voltage_line_v, current_line_a, power_w; or rated values",
+            "time_s, currents and voltages; or a row for each test of frequency_hz, voltage_line_v, current_line_a, power_w; or rated values",
             "give what was measured, under these names (`commissioner docs formats`); a circuit's values alone are what `identify` would find",
         )
     if not any(name in ("segment", "axis_deg") or name.startswith("voltage_") for name in columns):
@@ -496,12 +496,16 @@ def typed_metadata(path: Path, metadata: Mapping[str, str]) -> dict[str, float |
 def _require(table: Table, names: Sequence[str], what: str) -> None:
     missing = [name for name in names if name not in table.columns]
     if missing:
+        empty = next((r.name for r in table.readings if r.meaning == missing[0]), "")
         raise _refuse(
             table.source,
-            f"{what} needs the column {missing[0]}",
+            f"{what} needs the column {missing[0]}" + f", and {empty} holds no numbers" * bool(empty),
             ", ".join(table.columns) or "no column of numbers",
             ", ".join(names),
-            "rename or add the columns: " + ", ".join(missing) + _how_to_name(table),
+            "rename or add the columns: "
+            + ", ".join(missing)
+            + (" (in electrical degrees)" * ("axis_deg" in missing))
+            + _how_to_name(table),
         )
 
 
