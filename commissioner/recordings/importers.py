@@ -20,6 +20,7 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, mdf4, structures, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
+from commissioner.recordings.names import meaning_of
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
@@ -40,10 +41,11 @@ from commissioner.recordings.reading.mend import (
     without_empty_columns,
     without_untimed_rows,
 )
-from commissioner.recordings.reading.preface import Clock, clock_in
-from commissioner.recordings.reading.recognise import Recognised, recognise, windings_said
+from commissioner.recordings.reading.preface import Clock, clock_in, factors_said
+from commissioner.recordings.reading.recognise import Recognised, quantity, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
 from commissioner.recordings.sheet_names import is_sheet
+from commissioner.recordings.standstill.components import along_axis, with_phases
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,
@@ -235,7 +237,8 @@ def _of_table(table: Table, mapping: ChannelMap) -> Table:
     clock = clock_in((k, str(v), "") for k, v in table.metadata.items())
     period = table.metadata.get("sample_period_s")
     clock = replace(clock, interval_s=period, said_by="sample_period_s") if isinstance(period, float) else clock
-    return _table(found, table.metadata, clock, mapping, table.source, ())
+    notes = factors_said([[key, str(value)] for key, value in table.metadata.items()])
+    return _table(found, table.metadata, clock, mapping, table.source, (*table.notes, *notes))
 
 
 def _of_text(path: Path, mapping: ChannelMap) -> Table:
@@ -263,9 +266,13 @@ def _table(
     columns, timed = _timed(columns, clock, found.readings, source)
     if clock.interval_s is not None and any(note.code == TIME_MADE for note in timed):
         metadata.setdefault("sample_period_s", clock.interval_s)
-    _with_constants(columns, metadata)
+    _with_constants(columns, metadata, source)
+    columns, phases = with_phases(columns)
+    columns, along = along_axis(columns, source)
     unnamed = [ReadingNote(UNNAMED, f"{name}: its name does not say what it is") for name in found.unnamed]
-    return Table(columns, metadata, source, (*notes, *found.notes, *shorter, *timed, *unnamed), found.readings)
+    return Table(
+        columns, metadata, source, (*notes, *found.notes, *shorter, *timed, *phases, *along, *unnamed), found.readings
+    )
 
 
 def _timed(
@@ -306,12 +313,17 @@ def _of_one_length(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], li
     return {name: v for name, v in columns.items() if v.size == longest}, [note] if note else []
 
 
-def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str]) -> None:
-    """A standstill recording of one axis, or one segment, may say so once."""
-    for name in ("axis_deg", "segment"):
-        value = metadata.get(name)
-        if "voltage_axis_v" in columns and name not in columns and isinstance(value, float):
-            columns[name] = np.full(columns["voltage_axis_v"].size, value)
+def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str], source: str) -> None:
+    """A standstill recording of one axis, or one segment, may say so once: `axis_deg: 60`, `Achse: 60 deg`, `axis_rad: 1.047`."""
+    rows = max((v.size for v in columns.values()), default=0)
+    for key, said in metadata.items() if any(n.startswith("voltage_") for n in columns) else ():
+        name = meaning_of(key)
+        if (
+            name in ("axis_deg", "segment")
+            and name not in columns
+            and (value := quantity(key, said, name, source)) is not None
+        ):
+            columns[name] = np.full(rows, value)
 
 
 def _lacks(table: Table, missing: list[str]) -> DataRefused:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from commissioner.recordings.units import IN_NAME, read_unit, unbracketed, unit_in, without_brackets
+from commissioner.recordings.units import IN_NAME, is_temperature, read_unit, unbracketed, unit_in, without_brackets
 from commissioner.recordings.words import folded, translated
 
 PHASES = {
@@ -124,12 +124,19 @@ BESIDE = FILLING | {
     "no",
     "nr",
     "number",
+    "id",
+    "deg",
+    "el",
+    "elec",
+    "electrical",
+    "elektrisch",
 }
 """What else the names of a standstill test's columns say."""
 WHOLE_NAMES = {
     "achswinkel": "axis_deg", "achsenwinkel": "axis_deg", "achsspannung": "voltage_axis_v", "achsenspannung": "voltage_axis_v",
     "vdc": "dc_link_v", "udc": "dc_link_v", "dclink": "dc_link_v", "dclinkvoltage": "dc_link_v", "dcbus": "dc_link_v",
-    "dcbusvoltage": "dc_link_v", "zwischenkreisspannung": "dc_link_v",
+    "dcbusvoltage": "dc_link_v", "zwischenkreisspannung": "dc_link_v", "uzk": "dc_link_v", "vbus": "dc_link_v", "busvoltage": "dc_link_v",
+    "uaxis": "voltage_axis_v", "vaxis": "voltage_axis_v",
 }  # fmt: skip
 CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
@@ -148,6 +155,7 @@ _TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
 _RYB_AS_RST = str.maketrans("yb", "st")
 _STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)|([uv])s([abcuvw123]{2})")
 """`isa`, `usb`; `ias`, `vbs`; `usab`: stator quantities."""
+_PATH = re.compile(r"^.*\.(?=[^.\s\[\]()][^.\[\]()]*(?:[\[(].*)?$)")
 _NEUTRAL = re.compile(r"(?:[iuv]|current|voltage|strom|spannung|courant|tension)(?:n|neutral)")
 """Of the neutral: no phase, whatever letters its unit adds."""
 _KIND = rf"(?:{CURRENT}|{VOLTAGE})"
@@ -155,6 +163,8 @@ _COLOURED = re.compile(rf"(?<![a-z])({_KIND}?)([ryb]{{1,2}}|red|yellow|blue)(?=n
 """Phases by their colours, red, yellow and blue: `I_Y`, `VRY`, `B phase current`, `R-N voltage`."""
 _OTHERS = re.compile(rf"(?<![a-z]){_KIND}?[acst](?![a-z])", re.IGNORECASE)
 _OF_A_PHASE = re.compile(rf"(?<![a-z]){_KIND}(?=[ryb]{{0,2}}n?(?![a-z]))", re.IGNORECASE)
+_COMPONENT = re.compile(rf"({CURRENT}|{VOLTAGE})s?(alpha|beta)(?:ref|soll|set|cmd|command|act|ist|mess|meas)?")
+"""Of a vector: `i_alpha`, `uβ`, `us_alpha_ref`."""
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
@@ -162,13 +172,14 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
     """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
     if CONTRACT.fullmatch(name):
         return name
-    last = _PARAMETER.sub("", name.rsplit(".", maxsplit=1)[-1])
+    last = _PARAMETER.sub("", _without_path(name))
     name = translated(name if last.isdigit() else last)
     if _NEUTRAL.fullmatch(key_of(IN_NAME.sub("", name))):
         return None
     if not IN_NAME.sub("", name).strip() and (unit := read_unit(unit_in(name))) and unit.measures == "time":
         return "time_s"
-    return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
+    found = _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
+    return None if found == "time_s" and is_temperature(unit_in(name)) else found
 
 
 def unit_of(name: str, with_s: bool = False) -> str:
@@ -182,7 +193,7 @@ def unit_of(name: str, with_s: bool = False) -> str:
 
 def is_remark(text: str) -> bool:
     """Whether a text in brackets describes a channel: words for it, with a phase or without, or how a time of day is written."""
-    words = re.findall(r"[^\W\d_]+|\d+", unbracketed(text).lower())
+    words = re.findall(r"[^\W\d_]+|\d+|%", unbracketed(text).lower())
     described = [word for word in words if word in REMARKS]
     is_description = described and all(word in REMARKS or _ONE_PHASE.fullmatch(word) for word in words)
     return bool(is_description) or _CLOCK_FORM.fullmatch(unbracketed(text)) is not None
@@ -281,7 +292,8 @@ def key_of(name: str) -> str:
 
 
 def _without_path(name: str) -> str:
-    return name.rsplit(".", maxsplit=1)[-1]
+    """A name without the structures before it; points of its unit (`Ia [p.u.]`) and of a short word (`Segment No.`) are its own."""
+    return _PATH.sub("", name)
 
 
 def meanings_of(names: Sequence[str]) -> dict[str, str]:
@@ -298,7 +310,7 @@ def is_per_minute(name: str) -> bool:
 
 
 def _meaning(bare: str, with_s: bool) -> str | None:
-    bare = folded(bare)
+    bare = re.sub("[αΑ]", "alpha", re.sub("[βΒ]", "beta", folded(bare)))
     words = [word.lower() for word in _WORD.findall(bare)]
     key = re.sub(r"[^a-z0-9]", "", bare.lower())
     if key in TIME or _TIME_OF_RATE.fullmatch(key):
@@ -309,6 +321,8 @@ def _meaning(bare: str, with_s: bool) -> str | None:
         return at_rest
     if stator := _STATOR.fullmatch(key):
         return _column(stator[1] or stator[4], stator[2] or stator[3] or stator[5])
+    if component := _COMPONENT.fullmatch(key):
+        return f"current_{component[2]}_a" if re.fullmatch(CURRENT, component[1]) else f"voltage_{component[2]}_v"
     words = [word for word in words if word not in FILLING]
     kinds = [word for word in words if re.fullmatch(rf"{CURRENT}|{VOLTAGE}", word)]
     kind = max(kinds, key=len, default="")

@@ -32,7 +32,7 @@ SHEET = {
         rf"{_AMPS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:current|amps|strom|courant)|strangstrom"
     ),
     "power_w": re.compile(
-        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)power|powerinput|inputwatts"
+        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)+power(?:total)?|powerinput|inputwatts"
     ),
 }  # fmt: skip
 """Line values, values of one phase, and the power of all phases. Values of each phase (`I_u`, `U_12`) are a recording's columns."""
@@ -127,7 +127,8 @@ def resistance_meaning(name: str) -> str | None:
 def _first(name: str, told: Callable[[str], str | None]) -> str | None:
     """What the first reading of a name, without its unit, tells."""
     bare = _OHM_ENDING.sub("", IN_NAME.sub("", name).strip())
-    return next((found for reading in readings(bare) if (found := told(key_of(reading)))), None)
+    spelt = (*readings(bare), *readings(name))  # the V of `R_V` is a phase
+    return next((found for reading in spelt if (found := told(key_of(reading)))), None)
 
 
 def _of_one_winding(key: str) -> str | None:

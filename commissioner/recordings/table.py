@@ -29,6 +29,7 @@ from commissioner.recordings.formats.parquet import columns_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.said_tests import codes, is_title, unknown
 from commissioner.recordings.reading.slow_columns import currents_on_the_commands_clock, on_one_clock
+from commissioner.recordings.standstill.components import require_degrees, with_segment
 from commissioner.recordings.units import without_brackets
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
@@ -175,6 +176,8 @@ def _write_matlab(path: Path, columns: Mapping[str, Signal], metadata: Mapping[s
 def to_standstill(table: Table) -> StandstillRecording:
     """The table as a standstill recording; refuses missing columns, NaN, and time that does not lie on a grid."""
     table = _with_third_current(table)
+    with_one, said = with_segment(table.columns, table.source)
+    table = replace(table, columns=with_one, notes=(*table.notes, *said))
     columns = table.columns
     needed = ("time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a")
     running = [name for name in ("voltage_u_v", "voltage_uv_v", "voltage_vw_v", "speed_rad_per_s") if name in columns]
@@ -191,7 +194,7 @@ def to_standstill(table: Table) -> StandstillRecording:
             table.source,
             "no measurement is in this file: neither samples over time, nor test points, nor a maker's rated values",
             ", ".join([*columns, *table.metadata][:12]) or "no column",
-            "time_s, currents and voltages; or frequency_hz, voltage_line_v, current_line_a, power_w; or rated values",
+            "time_s, currents and voltages; or a row for each test of frequency_hz, voltage_line_v, current_line_a, power_w; or rated values",
             "give what was measured, under these names (`commissioner docs formats`); a circuit's values alone are what `identify` would find",
         )
     if not any(name in ("segment", "axis_deg") or name.startswith("voltage_") for name in columns):
@@ -210,6 +213,7 @@ def to_standstill(table: Table) -> StandstillRecording:
         raise _refuse(
             table.source, "dc_link_v is no DC link's voltage", bad, "> 0 V", "correct it, or leave the column out"
         )
+    require_degrees(columns["axis_deg"], table.source)
     segment = columns["segment"]
     if np.any(segment != np.round(segment)):
         bad = float(segment[segment != np.round(segment)][0])
@@ -455,7 +459,7 @@ def _not_numeric(path: Path, name: str, seen: object) -> DataRefused:
 CONTRACT_COLUMNS = frozenset(
     {
         "time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v",
-        "averaged_periods",
+        "averaged_periods", "current_alpha_a", "current_beta_a", "voltage_alpha_v", "voltage_beta_v",
         "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s",
         *POINT_COLUMNS, *POINT_FORMS, *POINT_RESISTANCES,
     }
@@ -492,12 +496,16 @@ def typed_metadata(path: Path, metadata: Mapping[str, str]) -> dict[str, float |
 def _require(table: Table, names: Sequence[str], what: str) -> None:
     missing = [name for name in names if name not in table.columns]
     if missing:
+        empty = next((r.name for r in table.readings if r.meaning == missing[0]), "")
         raise _refuse(
             table.source,
-            f"{what} needs the column {missing[0]}",
+            f"{what} needs the column {missing[0]}" + f", and {empty} holds no numbers" * bool(empty),
             ", ".join(table.columns) or "no column of numbers",
             ", ".join(names),
-            "rename or add the columns: " + ", ".join(missing) + _how_to_name(table),
+            "rename or add the columns: "
+            + ", ".join(missing)
+            + (" (in electrical degrees)" * ("axis_deg" in missing))
+            + _how_to_name(table),
         )
 
 

@@ -21,13 +21,17 @@ WHOLE = {
     "1/min": ("speed", math.pi / 30), "min-1": ("speed", math.pi / 30), "r/min": ("speed", math.pi / 30),
     "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "giri/min": ("speed", math.pi / 30), "min⁻¹": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
-    "°": ("angle", 1.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
+    "°": ("angle", 1.0), "rev": ("angle", 360.0), "turn": ("angle", 360.0), "turns": ("angle", 360.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
     "grad": ("angle", 1.0), "grados": ("angle", 1.0), "gradi": ("angle", 1.0), "degrés": ("angle", 1.0), "rad": ("angle", 180.0 / math.pi),
-    "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
+    "°c": ("temperature", 1.0), "degc": ("temperature", 1.0), "°f": ("temperature", 1.0), "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
     "微秒": ("time", 1e-6), "安": ("current", 1.0), "毫安": ("current", 1e-3), "伏": ("voltage", 1.0),
     "с": ("time", 1.0), "мс": ("time", 1e-3), "мкс": ("time", 1e-6), "а": ("current", 1.0), "ма": ("current", 1e-3),
     "в": ("voltage", 1.0), "кв": ("voltage", 1e3), "ka": ("current", 1e3), "kv": ("voltage", 1e3),
 }  # fmt: skip
+_OF_SAMPLES = re.compile(
+    r"(?<=[av])[\s_(]*(?:pk|peak|inst)\)?$|(?<=[a-z°])\.?[\s_(]*el(?:ec(?:tr(?:ical)?)?)?\.?\)?$", re.IGNORECASE
+)
+"""What a unit says beside itself that is so of every sample: `A peak`, `deg el.`"""
 PREFIX_WORD = {"milli": 1e-3, "mili": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9, "kilo": 1e3}
 DAY_S = 86400
 NO_UNIT = frozenset({"", "-", "none", "sequence", "unit", "units"})
@@ -36,7 +40,7 @@ FOREIGN = frozenset({"%", "pu", "p.u.", "counts", "count", "lsb", "digits", "raw
 """Units that stand for something only with a factor which the file does not give."""
 IN_NAME = re.compile(
     r"[\[(（【{<]\s*([^\])）】}>]*)\s*[\])）】}>]\s*$|(?:^|\s+)(?:in|en)\s+(\S{1,8})\s*$|\s*/\s*(\S{1,6})\s*$"
-    r"|(?:(?<!_per)_|[,:]\s+)(ms|us|µs|ns|s|ma|mA|A|mv|mV|V|kv|kV|rpm)$"
+    r"|(?:(?<!_per)_|[,:]\s+)(ms|us|µs|ns|s|ma|mA|A|mv|mV|V|kv|kV|rpm|rad)$"
 )
 """A unit at the end of a name: in brackets, after `in`, after a slash, an underscore, a comma or a colon."""
 
@@ -71,7 +75,7 @@ def unbracketed(text: str) -> str:
 
 def read_unit(text: str) -> Unit | None:
     """The unit that a text means, in or out of brackets; None where it is none."""
-    bare = unbracketed(text)
+    bare = _OF_SAMPLES.sub("", unbracketed(text))
     whole = WHOLE.get(bare.lower())
     if whole:
         return Unit(*whole)
@@ -92,6 +96,21 @@ def _upper(prefix: str, base: str) -> Unit | None:
     """`US`, `NS`: capitals of micro and nano have no other meaning."""
     lower = prefix.lower()
     return Unit(BASE[base], PREFIX[lower]) if lower in {"u", "n"} and len(base) == 1 else None
+
+
+def is_temperature(text: str) -> bool:
+    """Whether a unit is one of temperature: `T [°C]` is no time."""
+    return (unit := read_unit(text)) is not None and unit.measures == "temperature"
+
+
+def is_peak(text: str) -> bool:
+    """Whether a unit says that its values are the peaks of an alternation: `Vpk`, `A peak`."""
+    return re.search(r"(?<=[av])[\s_(]*(?:pk|peak)\)?$", unbracketed(text), re.IGNORECASE) is not None
+
+
+def is_rms(text: str) -> bool:
+    """Whether a unit, as people write it, says that its values are root mean squares: `Arms`, `A rms`, `Veff`."""
+    return re.search(r"(?<=[av])[\s_(]*(?:rms|eff)\)?$", unbracketed(text), re.IGNORECASE) is not None
 
 
 def is_unit(text: str) -> bool:

@@ -188,6 +188,11 @@ def _is_direct(rows: _Rows) -> NDArray[np.bool_]:
 def _wrong_cell(ac: _Rows) -> DataRefused | None:
     for name, values in zip(POINT_COLUMNS, (ac.frequency_hz, ac.voltage_v, ac.current_a, ac.power_w), strict=True):
         wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
+        if wrong.size and not np.isfinite(values).any():
+            return refused(
+                f"{name} of the alternating-current tests is not there", "no number", "a number in every row",
+                f"add the column {name}: a locked rotor is often measured at another frequency than the plate's",
+            )  # fmt: skip
         if wrong.size:
             return refused(
                 f"{name} is {values[wrong[0]]:g} in point {wrong[0] + 1} of the alternating-current tests",

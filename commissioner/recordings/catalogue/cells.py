@@ -37,9 +37,12 @@ PER_CENT_FROM = {"efficiency": 1.5, "power_factor": 1.5, "rated_slip": 0.3, "sta
 """Without a unit a larger number is per cent."""
 
 
+_FOOTNOTE = re.compile(r"(?<=[\w%])\s+\(?\d\)(?=\s*(?:;|$))")
+
+
 def split_unit(printed: str) -> tuple[str, str] | None:
-    """(number, unit) of a cell; None where it begins with no number."""
-    found = PRINTED.match(printed)
+    """(number, unit) of a cell, without the mark of a footnote (`91,4 1)`); None where it begins with no number."""
+    found = PRINTED.match(_FOOTNOTE.sub("", printed))
     return None if found is None else (found[1].strip(), found[2].strip(" ;,\t\"'"))
 
 

@@ -20,9 +20,17 @@ from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import Marks, is_number, marks_of, plain, to_numbers
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
-from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
+from commissioner.recordings.reading.preface import (
+    Clock,
+    clock_in,
+    factors_said,
+    metadata_of,
+    pairs,
+    probes_in,
+    units_in,
+)
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
-from commissioner.recordings.reading.said_tests import codes, is_title, unknown
+from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
 from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
 
@@ -77,12 +85,16 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     if probes := probes_in(layout.preface):
         notes.append(ReadingNote("probes", f"probes of {probes} are named above the columns: numbers are taken as they are printed; "
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
-    if factors := factors_in(layout.preface):
-        notes.append(ReadingNote("factors", f"{factors} stands above the columns: numbers are taken as they are printed; where they do not "
-                                 "hold this factor yet, map the channels with it"))  # fmt: skip
+    notes += factors_said(layout.preface)
     names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
     units = tuple(unit or _said_once(name, units_in(said)) for name, unit in zip(names, units, strict=True))
-    return RawTable(names, units, tuple(columns), dict(metadata_of(said)), clock, tuple(notes))
+    return RawTable(names, units, tuple(columns), _pointed(metadata_of(said), marks), clock, tuple(notes))
+
+
+def _pointed(metadata: Mapping[str, str], marks: Marks) -> dict[str, str]:
+    """Numbers above the columns by the decimal mark of the file."""
+    is_comma = marks.decimal == ","
+    return {k: v.replace(",", ".") if is_comma and re.fullmatch(r"[+-]?\d+,\d+", v) else v for k, v in metadata.items()}
 
 
 def _said_once(name: str, units: Mapping[str, str]) -> str:
@@ -114,10 +126,11 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     for name, column in zip(layout.names, table.columns, strict=True):
         values, wrong = to_numbers(column, marks, source)
         filled += np.isfinite(values)
-        cells = [str(cell) for cell in column.to_pylist()] if is_title(name) else []
-        said = codes(cells)
+        is_said = is_title(name) or (meaning_of(name) == "segment" and not np.isfinite(values).any())
+        cells = [str(cell) for cell in column.to_pylist()] if is_said else []
+        said = codes(cells) if is_title(name) else in_runs(cells)
         columns.append(values if said is None else said)
-        notes += () if said is None else unknown(cells, said)
+        notes += unknown(cells, said) if said is not None and is_title(name) else ()
         if said is None and meaning_of(name) != "time_s" and any(map(_STATISTIC.fullmatch, wrong)):
             below |= [_STATISTIC.fullmatch(str(cell).strip()) is not None for cell in column.to_pylist()]
         if wrong and said is None and np.isfinite(values).any() and meaning_of(name) != "time_s":

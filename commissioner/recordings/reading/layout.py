@@ -295,11 +295,15 @@ def _stripped(row: Row, width: int) -> Row:
 
 
 def _is_units(row: Row) -> bool:
-    """A row of units: two or more cells that are one, and no cell that is something else but a number."""
+    """A row of units: cells that are one, and none that is something else but a number, unless a time's or a frequency's unit begins
+    it and half are known: one that is not known is asked for where its column is needed."""
     said = [cell for cell in row if cell]
+    others = [cell for cell in said if not (is_unit(cell) or is_number(cell))]
+    begins = len(said) > 2 and (unit := read_unit(said[0])) is not None and unit.measures in {"time", "frequency"}
+    are_few = 2 * len(others) <= len(said) or any("%" in cell for cell in others)
     return (
         len(said) >= 1
-        and all(is_unit(cell) or is_number(cell) for cell in said)
+        and (not others or (begins and are_few and all(len(cell) > 1 for cell in others)))
         and sum(read_unit(cell) is not None or cell.strip("[]() ").lower() in {"%", "pu"} for cell in said) >= 1
         and not all(len(cell) == 1 and cell.isupper() and cell in "UVW" for cell in said)
     )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from commissioner.recordings.units import read_unit, without_brackets
 from commissioner.recordings.words import translated
+from commissioner.records import ReadingNote
 
 INTERVAL = frozenset(
     {"sampleinterval", "samplinginterval", "samplingperiod", "sampleperiod", "sampleperiods", "dt", "deltat", "deltatime",
@@ -124,6 +125,12 @@ def factors_in(preface: Sequence[Sequence[str]]) -> str:
         for name, cells in _keyed(preface, _SCALE)
     ]
     return "; ".join(f"{name} {', '.join(cells)}" for name, cells in found if any(re.search(r"\d", c) for c in cells))
+
+
+def factors_said(preface: Sequence[Sequence[str]]) -> list[ReadingNote]:
+    """A note of the scales that a preface names: none is applied."""
+    what = "stands above the columns: numbers are taken as they are printed; where they do not hold this factor yet, map the channels with it"
+    return [ReadingNote("factors", f"{factors} {what}")] if (factors := factors_in(preface)) else []
 
 
 def units_in(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:

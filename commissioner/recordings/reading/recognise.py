@@ -26,7 +26,18 @@ from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.reading.said_tests import is_title
 from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns, sheet_unit, winding_columns
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
-from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in, without_brackets
+from commissioner.recordings.units import (
+    FOREIGN,
+    IN_NAME,
+    NO_UNIT,
+    is_peak,
+    is_rms,
+    is_temperature,
+    read_unit,
+    unbracketed,
+    unit_in,
+    without_brackets,
+)
 from commissioner.records import ReadingNote, Signal
 
 MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
@@ -37,7 +48,7 @@ SAME_TIME = 0.01
 """Of a sample period, by which two columns of one time may differ."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
 """What an instrument calls a channel that nobody has named."""
-_QUANTITY = re.compile(r"(\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D\S*)?")
+_QUANTITY = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D\S*)?")
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,7 @@ def recognise(
     names: Sequence[str], units: Sequence[str], values: Sequence[Signal], targets: Mapping[str, Target], source: str
 ) -> Recognised:
     """The columns by the contract's names where they mean one, else by their own; see the module."""
+    names = [f"{n} [{u}]" if is_temperature(u) and not unit_in(n) else n for n, u in zip(names, units, strict=True)]
     meant = in_company(names)
     with_s = uses_rst([n for n in meant.values() if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
@@ -60,7 +72,7 @@ def recognise(
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
     meaning: str | None
-    readings, notes, unnamed = [], [], []
+    readings, notes, unnamed, rms = [], [], [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
         name = names[k]
@@ -71,6 +83,8 @@ def recognise(
         is_asked = name in from_zero and target is None
         if name not in targets and name not in CONTRACT_COLUMNS and (found := of_points.get(name)):
             unit = unit or sheet_unit(name)
+            if is_peak(unit):
+                raise _refused(name, unit, found, source, "a peak, where a test sheet holds rms values")
             meaning, factor = found, _factor(name, unit, found, source)
         else:
             meaning, factor = (None, 1.0) if is_asked else _meaning(meant[name], unit, target, with_s, source)
@@ -86,7 +100,12 @@ def recognise(
             place[meaning] = k
             with np.errstate(invalid="ignore", over="ignore"):
                 columns[meaning] = factor * values[k] if factor != 1.0 else values[k]
+        if not of_sheet and meaning is not None and name not in targets and is_rms(unit or unit_in(name)):
+            rms.append(name)
         readings.append(ColumnReading(name, meaning, unit or _own_unit(name), factor))
+    if rms:
+        notes.append(ReadingNote("rms", f"the unit of {', '.join(rms)} is one of rms values: samples are taken as they are printed; where "
+                                 "they were divided by sqrt(2), map the channels with a factor of 1.41421"))  # fmt: skip
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
 
 
@@ -124,12 +143,20 @@ def windings_said(metadata: Mapping[str, float | str], source: str) -> dict[str,
     for name, value in metadata.items():
         if key_of_plate(name) == "connection":
             out["connection"] = value
-        meaning, said = windings.get(name) or resistance_meaning(name), _QUANTITY.fullmatch(str(value).strip())
-        if meaning is None or said is None or name in CONTRACT_COLUMNS:
-            continue
-        unit = said[2] or unit_of(name) or sheet_unit(name)
-        out[meaning] = _factor(name, unit, meaning, source) * float(said[1].replace(",", "."))
+        meaning = windings.get(name) or resistance_meaning(name)
+        if meaning and name not in CONTRACT_COLUMNS and (number := quantity(name, value, meaning, source)) is not None:
+            out[meaning] = number
     return out
+
+
+def quantity(name: str, value: float | str, meaning: str, source: str) -> float | None:
+    """What a line above the columns says (`R_uv (mOhm): 1520`, `axis: 60 deg`), in SI; None where it is no number."""
+    said = _QUANTITY.fullmatch(str(value).strip())
+    if said is None:
+        return None
+    return _factor(name, said[2] or unit_of(name) or sheet_unit(name), meaning, source) * float(
+        said[1].replace(",", ".")
+    )
 
 
 def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: str) -> tuple[str | None, float]:
@@ -141,7 +168,8 @@ def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: 
             target.factor if target.factor is not None else _factor(name, unit, target.column, source)
         )
     bare = without_brackets(name)
-    bare = bare.lower() if bare.lower() in CONTRACT_COLUMNS else bare
+    spelt = re.sub(r"[\s-]+", "_", bare.lower())
+    bare = spelt if spelt in CONTRACT_COLUMNS else bare
     if bare in CONTRACT_COLUMNS:
         return bare, _factor(name, unit if unit != unit_in(bare) else "", bare, source)
     if of := turned(name):

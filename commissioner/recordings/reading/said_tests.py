@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,6 +31,13 @@ def codes(cells: Sequence[str]) -> Signal | None:
     """`(n,)` of `records.DIRECT_TEST` ...; not a number where a cell says nothing known, None where no cell does."""
     out = np.array([_code(cell) for cell in cells])
     return out if np.isfinite(out).any() else None
+
+
+def in_runs(cells: Sequence[str]) -> Signal | None:
+    """`(n,)` from 0, one more wherever the text changes (`DC`, `step at 60`); None where a cell is empty, or there is none."""
+    if not cells or not all(cell.strip() for cell in cells):
+        return None
+    return np.cumsum([0, *(a != b for a, b in pairwise(cells))]).astype(np.float64)
 
 
 def _code(cell: str) -> float:

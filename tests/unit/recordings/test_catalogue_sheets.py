@@ -55,6 +55,7 @@ FORMS = {
     "11;400;50;1465;21,5;0,81;91,4;2,3;7,4;2,9;0,044;D\n",
     "units below": "P_N,U_N,f,n_N,I_N,cos phi,eta,M_A/M_N,I_A/I_N,M_K/M_N,J,connection\nkW,V,Hz,1/min,A,,%,,,,kgm2,\n"
     "11,400,50,1465,21.5,0.81,91.4,2.3,7.4,2.9,0.044,delta\n",
+    "footnotes": GERMAN.replace("91,4;%", "91,4 1);%").replace("21,5;A", "21,5 A (2)"),
     "keys": "# rated_power_w: 11000\n# rated_voltage_v: 400\n# rated_frequency_hz: 50\n# rated_speed_rpm: 1465\n# rated_current_a: 21.5\n"
     "# power_factor: 0.81\n# efficiency: 0.914\n# starting_torque_ratio: 2.3\n# starting_current_ratio: 7.4\n"
     "# breakdown_torque_ratio: 2.9\n# inertia_kg_m2: 0.044\n# connection: delta\n",
