@@ -302,15 +302,11 @@ def _of_one_length(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], li
     """The columns as long as the longest of the contract's (all of them where there is none), and which of its were not."""
     ours = {name: v.size for name, v in columns.items() if name in CONTRACT_COLUMNS}
     longest = max(ours.values(), default=max((v.size for v in columns.values()), default=0))
-    others = [f"{name} {size}" for name, size in ours.items() if size != longest]
-    note = (
-        ReadingNote(
-            "length", f"{max(ours, key=ours.__getitem__)} holds {longest} values, {', '.join(others)}: not used"
-        )
-        if others
-        else None
-    )
-    return {name: v for name, v in columns.items() if v.size == longest}, [note] if note else []
+    kept = {name: v for name, v in columns.items() if v.size == longest}
+    if not (others := [f"{name} {size}" for name, size in ours.items() if size != longest]):
+        return kept, []
+    what = f"{max(ours, key=ours.__getitem__)} holds {longest} values, {', '.join(others)}: not used"
+    return kept, [ReadingNote("length", what)]
 
 
 def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str], source: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.records import ReadingNote, Signal
@@ -12,7 +13,6 @@ from commissioner.records import ReadingNote, Signal
 MOST_ACROSS = 0.2
 """Of the voltage along the axis: what of it may lie across, by dead time and by ripple. A wrong axis by 12 degrees is more."""
 TURN_RAD = 6.2832
-ROOT_3 = float(np.sqrt(3.0))
 
 
 def with_phases(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
@@ -23,10 +23,10 @@ def with_phases(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[
         if alpha is None or beta is None or any(f"{kind}_{phase}_{unit}" in out for phase in ("u", "v", "w", "axis")):
             continue
         u, v = f"{kind}_u_{unit}", f"{kind}_v_{unit}"
-        out[u], out[v] = alpha, (ROOT_3 * beta - alpha) / 2.0
+        out[u], out[v] = alpha, (np.sqrt(3.0) * beta - alpha) / 2.0
         if kind == "voltage":
             out["voltage_w_v"] = -(out[u] + out[v])
-        out.pop(f"{kind}_alpha_{unit}"), out.pop(f"{kind}_beta_{unit}")
+        del out[f"{kind}_alpha_{unit}"], out[f"{kind}_beta_{unit}"]
         notes.append(
             ReadingNote("components", f"the {kind}s are alpha and beta: taken with alpha as phase u and as large as it")
         )
@@ -36,12 +36,13 @@ def with_phases(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[
 def along_axis(columns: Mapping[str, Signal], source: str) -> tuple[dict[str, Signal], list[ReadingNote]]:
     """The columns of a standstill test with `voltage_axis_v` in place of the voltages of phases or between lines. DataRefused: these do
     not lie along its axis."""
-    axis, found = columns.get("axis_deg"), _alpha_beta(columns)
-    if axis is None or "segment" not in columns or "voltage_axis_v" in columns or found is None:
+    axis = columns.get("axis_deg")
+    if axis is None or "segment" not in columns or "voltage_axis_v" in columns:
         return dict(columns), []
-    alpha, beta = found
-    angle = np.deg2rad(axis)
-    along, across = alpha * np.cos(angle) + beta * np.sin(angle), beta * np.cos(angle) - alpha * np.sin(angle)
+    if (voltage := _voltage_vector(columns)) is None:
+        return dict(columns), []
+    turned = voltage * np.exp(-1j * np.deg2rad(axis))
+    along, across = turned.real, turned.imag
     part = float(np.sqrt(np.nanmean(across**2) / max(float(np.nanmean(along**2)), 1e-12)))
     if part > MOST_ACROSS:
         raise DataRefused(
@@ -81,12 +82,14 @@ def with_segment(columns: Mapping[str, Signal], source: str) -> tuple[dict[str, 
     return {**columns, "segment": np.zeros(columns["time_s"].size)}, [note]
 
 
-def _alpha_beta(columns: Mapping[str, Signal]) -> tuple[Signal, Signal] | None:
+def _voltage_vector(columns: Mapping[str, Signal]) -> NDArray[np.complex128] | None:
     """Of the three phases' voltages, or of two between lines; None where they are not there. What all phases share has no part in it."""
+    from commissioner.monitor.signals.supply import phase_voltages, space_vector
+
     u, v, w, uv, vw = (columns.get(name) for name in _USED[:5])
     if u is not None and v is not None and w is not None:
-        return (2.0 * u - v - w) / 3.0, (v - w) / ROOT_3
-    return ((2.0 * uv + vw) / 3.0, vw / ROOT_3) if uv is not None and vw is not None else None
+        return space_vector(u, v, w)
+    return space_vector(*phase_voltages(uv, vw, -(uv + vw))) if uv is not None and vw is not None else None
 
 
 _USED = ("voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
