@@ -32,6 +32,7 @@ from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.procedure.energised.closing_bias import SECONDS as BIAS_S
 from commissioner.procedure.energised.multitone import KNOWN_LOG_STD
+from commissioner.procedure.energised.staircase import TOP
 from commissioner.procedure.plan import BELOW_TRIP
 from tests.support.standstill import saturating_block, usable_motors
 
@@ -133,9 +134,11 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
         box, PERIOD_S, peak_a, start=start, start_log_std=log_std, compensation=compensation
     )  # fmt: skip
     latency = rng.uniform(0.005, 0.1)
+    held_v = _holds_v(truth, min(top_a, TOP * limit_wb / truth.machine[3]), axis_deg)
     guard = FluxGuard(
-        limit_wb, latency, chosen.excitation, PERIOD_S, resistance, known, axis_deg, current_a=test_a, trip_a=trip_a
-    )
+        limit_wb, latency, chosen.excitation, PERIOD_S, resistance, known, axis_deg,
+        current_a=test_a, trip_a=trip_a, held_v=held_v,
+    )  # fmt: skip
     first = min(FIRST_SCALE, guard.safe_scale)
     if knowledge == "measured":
         first = guard.begin_known(start, log_std, RAMP_PER_S)
@@ -213,14 +216,15 @@ def _follow(
 def _levels(rng: np.random.Generator, truth: Hidden, top_a: float, axis_deg: float) -> list[DcLevel]:
     """A staircase's settled levels."""
     currents = top_a * np.array([1.0, 0.6, 0.3])
-    cosines = np.array(phase_cosines(axis_deg))
-    lost = [
-        2.0 / 3.0 * float(np.sum(cosines * truth.plateau_v * np.tanh(i * cosines / truth.knee_a))) for i in currents
-    ]
     held = currents * rng.uniform(0.97, 1.03)
-    return [
-        DcLevel(float(truth.machine[0] * i + f), float(h), 0.0) for i, f, h in zip(currents, lost, held, strict=True)
-    ]
+    return [DcLevel(_holds_v(truth, i, axis_deg), float(h), 0.0) for i, h in zip(currents, held, strict=True)]
+
+
+def _holds_v(truth: Hidden, current_a: float, axis_deg: float) -> float:
+    """The direct voltage that drives this current in the end."""
+    cosines = np.array(phase_cosines(axis_deg))
+    lost_v = 2.0 / 3.0 * np.sum(cosines * truth.plateau_v * np.tanh(current_a * cosines / truth.knee_a))
+    return float(truth.machine[0] * current_a + lost_v)
 
 
 def _bias(

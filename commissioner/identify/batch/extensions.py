@@ -33,13 +33,18 @@ FINAL_STEPS = 200
 
 
 def select_model(
-    segments: Sequence[Segment], period_s: float, starts: Sequence[InverseGamma], leg: InverterError | None
+    segments: Sequence[Segment],
+    period_s: float,
+    starts: Sequence[InverseGamma],
+    leg: InverterError | None,
+    law: LegLaw | None = None,
 ) -> BatchFit:
     """Greedy choice by the fit's criterion: whichever of delay, inverter error, saturation and drift helps most is
     added, then the next, and what has become superfluous is dropped. What a change would bring is foreseen from one
     evaluation (`Foresight`); what promises enough is fitted. A staircase's inverter error is in from the start; without
-    one it is unknown, and the fit begins with none, a small and a large one, from every start."""
-    law = LegLaw(max(float(np.max(np.abs(s.current_a))) for s in segments))
+    one it is unknown, and the fit begins with none, a small and a large one, from every start. `law`: another test's, for
+    curves of one inverter are put together knot by knot; else one for the currents of these segments."""
+    law = law or LegLaw(max(float(np.max(np.abs(s.current_a))) for s in segments))
     begun, others = _begun(segments, period_s, starts, leg, law)
     best = min(begun, key=lambda f: f.criterion())
     start = best.gamma.as_inverse_gamma()

@@ -21,6 +21,8 @@ from commissioner.identify.estimate.sufficiency import require_conditioned
 from commissioner.identify.intake.alignment import more_periods
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
+from commissioner.identify.inverter.leg_law import LegLaw
+from commissioner.identify.inverter.leg_pair import PairLaw
 from commissioner.identify.inverter.staircase import InverterError, Staircase, dc_levels, fit_staircase
 from commissioner.identify.observer.offline import excited_part, observe
 from commissioner.motor.circuit import InverseGamma
@@ -30,6 +32,9 @@ Estimator = Literal["pao", "lyapunov", "nls"]
 Matrix = NDArray[np.float64]
 STILL = 1e-3
 """What a fit that begins at another axis' may still have to go, in standard errors."""
+POORER = 1.1
+"""Of the earlier axis' residual: what a fit that begins like it may leave before the axis is also fitted as if it were the first. The
+model chosen for a small flux, bent as far as a larger one goes, left 1.36 of the noise."""
 LARGEST_DISAGREEMENT = 3.0
 """Joint standard errors between observer and batch fit beyond which the observer is not believed."""
 
@@ -88,8 +93,11 @@ def fit_axis(
     """Batch fit of one test; `like` is an earlier axis' whose model and values it begins with, where its own staircase is
     only looked at if they do not do."""
     fit = _begun_like(like, stretches, period_s) if like is not None else None
-    stairs = None if fit else _staircase(stretches)
-    fit = fit or _fitted(stretches, stairs, plate, period_s, guess, leg or (stairs.inverter if stairs else None))
+    stairs, law = None, like.batch.model.leg if like is not None else None
+    if fit is None or (like is not None and fit.batch.noise_a > POORER * like.batch.noise_a):
+        stairs = _staircase(stretches)
+        anew = _fitted(stretches, stairs, plate, period_s, guess, leg or (stairs.inverter if stairs else None), law)
+        fit = min((f for f in (fit, anew) if f is not None), key=lambda f: f.batch.criterion())
     if more_periods(fit.batch.delay, period_s):
         return fit  # on the wrong rows nothing else of it counts
     try:
@@ -98,7 +106,7 @@ def fit_axis(
         if leg is not None or (stairs or _staircase(stretches)) is None:
             raise
         # what was taken for settled levels was none: begin as if there were none
-        fit = _fitted(stretches, None, plate, period_s, guess, None)
+        fit = _fitted(stretches, None, plate, period_s, guess, None, law)
         require_conditioned(fit.batch)
     return replace(fit, batch=widened(fit.batch, segments(fit.stretches)))
 
@@ -110,10 +118,12 @@ def _fitted(
     period_s: float,
     guess: InverseGamma | None,
     first_leg: InverterError | None,
+    law: LegLaw | PairLaw | None,
 ) -> AxisFit:
     chosen = list(stretches)
     starts = _starts(chosen, plate, period_s, guess, first_leg)
-    fit = select_model(segments(chosen), period_s, starts, first_leg)
+    known = law if isinstance(law, LegLaw) else None
+    fit = select_model(segments(chosen), period_s, starts, first_leg, known)
     chosen, fit = _better_with_link(chosen, period_s, fit)
     return AxisFit(tuple(chosen), stairs, fit, chosen[0] is not stretches[0], tuple(stretches))
 

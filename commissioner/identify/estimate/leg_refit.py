@@ -124,11 +124,11 @@ def _fit_all(fits: Sequence[BatchFit], tests: Sequence[Sequence[Segment]], first
 
 def _in_common(fits: Sequence[BatchFit]) -> tuple[Signal, Matrix, float]:
     """The loss's values by all tests, their covariance, and chi-square of the tests' differences."""
-    part = fits[0].model.leg_slice
-    weights = [np.linalg.inv(f.covariance[part, part]) for f in fits]
+    values = [f.theta[f.model.leg_slice] for f in fits]
+    weights = [np.linalg.inv(f.covariance[f.model.leg_slice, f.model.leg_slice]) for f in fits]
     covariance = np.linalg.inv(np.sum(weights, axis=0))
-    mean = covariance @ np.sum([w @ f.theta[part] for w, f in zip(weights, fits, strict=True)], axis=0)
-    apart = sum(float((f.theta[part] - mean) @ w @ (f.theta[part] - mean)) for w, f in zip(weights, fits, strict=True))
+    mean = covariance @ np.sum([w @ v for w, v in zip(weights, values, strict=True)], axis=0)
+    apart = sum(float((v - mean) @ w @ (v - mean)) for w, v in zip(weights, values, strict=True))
     return mean, covariance, apart
 
 

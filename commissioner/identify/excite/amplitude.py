@@ -1,7 +1,7 @@
 """How much of the designed amplitude a motor may be given: by what is known of it, and while nothing is.
 
-A tone of amplitude A cannot make more flux than A / omega (1 - R_s Y is at most 1 for a passive machine), so a first
-scale is safe for any motor. What is known of the motor, taken to the bad side, permits more. Behind an inverter that loses
+A tone of amplitude A cannot make more flux than A / omega (1 - R_s Y is at most 1 for a passive machine), and no command makes more
+than a direct voltage as large as its peaks: so a first scale is safe for any motor. What is known of the motor, taken to the bad side, permits more. Behind an inverter that loses
 several times R_s I the current follows the amplitude like a corner, and no describing function tells it: it is simulated.
 """
 
@@ -34,23 +34,29 @@ STRIDE, HALVINGS = 4, 7
 @dataclass(frozen=True)
 class Amplitude:
     """`limit_wb`: stator flux never to be passed; `current_a`: peak current aimed at; `plateau_v`: what the inverter takes
-    of the axis voltage at large currents."""
+    of the axis voltage at large currents; `held_v`: a direct voltage that the motor was given, its flux staying below the limit."""
 
     forecast: Forecast
     limit_wb: float
     current_a: float
     plateau_v: float
     sample_period_s: float
+    held_v: float = 0.0
 
     @property
     def safe(self) -> float:
         """The scale at which no motor whatever can pass the flux limit.
 
         Either flux stays below it even without resistance and inverter, or the whole command stays inside the measured
-        dead band (`SURE_LOSS` of it), where no current flows. The two do not add up: fast tones carry slow ones across.
+        dead band (`SURE_LOSS` of it), where no current flows, or below a direct voltage that was held. The first two do not add up: fast tones
+        carry slow ones across. The last: with I the current that V drives in the end, a stator current of I lets the flux rise no more
+        (u - R_s I - F(I) <= 0 for every u <= V), and the rotor's flux follows the current, so neither ever passes what V makes.
         """
-        in_dead_band = SURE_LOSS * self.plateau_v / max(self.forecast.excitation.peaks_v, 1e-12)
-        return min(1.0, max(self.limit_wb / max(self._bound_wb(), 1e-12), in_dead_band))
+        bounds_v = max(SURE_LOSS * self.plateau_v, self.held_v)
+        return min(
+            1.0,
+            max(self.limit_wb / max(self._bound_wb(), 1e-12), bounds_v / max(self.forecast.excitation.peaks_v, 1e-12)),
+        )
 
     def _bound_wb(self) -> float:
         """Sum of A / omega (1 + |sin phase|): flux of a machine without resistance, started from rest at full scale."""

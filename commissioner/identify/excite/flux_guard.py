@@ -75,7 +75,7 @@ class _Seen:
 class FluxGuard:
     """One per energised stretch, starting at rest. `latency_s` is from sample to the command that answers it taking
     effect (link both ways); `reaction_s` what the drive's amplitude ramp takes; `current_a` is the peak current that the
-    amplitude aims at, `trip_a` the one at which the drive ends the test: half-way between them the guard acts."""
+    amplitude aims at, `trip_a` the one at which the drive ends the test: half-way between them the guard acts; `held_v` as in `Amplitude`."""
 
     limit_wb: float
     latency_s: float
@@ -87,6 +87,7 @@ class FluxGuard:
     reaction_s: float = 0.02
     current_a: float = math.inf
     trip_a: float = math.inf
+    held_v: float = 0.0
     began_s: float = 0.0
     """Time between the excitation's start and the first sample."""
     _integral: Signal = field(default_factory=lambda: np.zeros(2), init=False)
@@ -105,7 +106,9 @@ class FluxGuard:
             raise ValueError("the guard limits the amplitude of tones; what a DC bias does is out of its reach")
         self._forecast = Forecast.behind(self.inverter, self.excitation, self.axis_deg)
         plateau_v = max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
-        self._amplitude = Amplitude(self._forecast, self.limit_wb, self.current_a, plateau_v, self.sample_period_s)
+        self._amplitude = Amplitude(
+            self._forecast, self.limit_wb, self.current_a, plateau_v, self.sample_period_s, self.held_v
+        )
 
     @property
     def safe_scale(self) -> float:

@@ -66,6 +66,7 @@ class UnderTest:
         self._guard = FluxGuard(
             job.flux_limit_wb(resistance_ohm), job.link_latency_s, chosen.excitation, sample_s, resistance_ohm,
             inverter, axis_deg, current_a=aimed_current_a(job, findings), trip_a=tripping_current_a(job, findings),
+            held_v=findings.held_v,
         )  # fmt: skip
         first = min(job.plan.excitation.first_scale, self._guard.safe_scale)
         if findings.is_measured:

@@ -98,6 +98,7 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     findings.knee = findings.knee or settled_points(stair.knee, held)
     fitted = resistance.fit_staircase((*held, *findings.knee), axis_deg)
     findings.staircases.append(fitted)
+    findings.held_v = stair.held_v(held)
     value, std = fitted.stator_resistance
     yield Tell(StaircaseFitted(axis_deg, value, std, fitted.error_voltage.value, stair.seconds))
     return Event.RESISTANCE_KNOWN
@@ -308,6 +309,11 @@ class _Stair(DirectCurrent):
         settled = self._heading()
         rows = zip(self._held, settled.current_a, settled.std_a, strict=True)
         return tuple(DcLevel(voltage_v, float(a), float(s)) for (voltage_v, _), a, s in rows)
+
+    def held_v(self, held: Sequence[DcLevel]) -> float:
+        """The largest of these levels' voltages whose current is not above the top one."""
+        most_a = (1.0 + SETTLED) * self._top_a
+        return max((abs(level.voltage_v) for level in held if abs(level.current_a) <= most_a), default=0.0)
 
     def first_current(self) -> FirstCurrent:
         """From the levels that were held: the larger, the smaller, the larger again."""

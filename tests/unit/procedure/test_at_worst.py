@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import InverseGamma, Quantity
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.course import Findings
 from commissioner.procedure.energised.staircase import KNOWN_TOP, _Stair
-from commissioner.procedure.steps import AT_WORST
+from commissioner.procedure.steps import AT_WORST, PLATE_RESISTANCE_STD
 from commissioner.records import DriveIdentity
 from tests.unit.procedure.test_course import _job
 
@@ -48,5 +48,26 @@ def test_no_measured_resistance_moves_the_flux_limit_beyond_what_the_plate_allow
 @pytest.mark.parametrize(("seen_ohm", "end"), [(-1.0, "lower"), (1e3, "upper")])
 def test_a_staircase_of_nonsense_leaves_a_resistance_of_the_plate(seen_ohm, end):
     job = _job()
-    stair = SimpleNamespace(stator_resistance=SimpleNamespace(value=seen_ohm))
+    stair = SimpleNamespace(stator_resistance=Quantity(seen_ohm, 0.01))
     assert Findings(staircases=[stair]).resistance_ohm(job) == getattr(prior(job.nameplate), end).stator_resistance_ohm
+
+
+def test_a_staircase_that_tells_nothing_leaves_the_plates_resistance_and_a_sure_one_its_own():
+    job = _job()
+    typical_ohm = prior(job.nameplate).typical.stator_resistance_ohm
+    unsure, sure = (
+        SimpleNamespace(stator_resistance=Quantity(value * typical_ohm, std * typical_ohm))
+        for value, std in ((0.0, 2.0), (0.6, 0.01))
+    )
+    assert Findings(staircases=[unsure]).resistance_ohm(job) == pytest.approx(typical_ohm, rel=0.1)
+    assert Findings(staircases=[sure]).resistance_ohm(job) == pytest.approx(0.6 * typical_ohm, rel=0.01)
+
+
+def test_look_staircase_and_plate_count_by_their_standard_errors():
+    job = _job()
+    typical_ohm = prior(job.nameplate).typical.stator_resistance_ohm
+    value_ohm, std_ohm = 0.4 * typical_ohm, PLATE_RESISTANCE_STD * typical_ohm
+    look = SimpleNamespace(parameters=replace(FOUND, stator_resistance_ohm=value_ohm), std=(std_ohm, 0.0, 0.0, 0.0))
+    stair = SimpleNamespace(stator_resistance=Quantity(value_ohm, std_ohm))
+    seen_ohm = Findings(look=look, staircases=[stair]).resistance_ohm(job)
+    assert seen_ohm == pytest.approx((1.0 + 0.4 + 0.4) / 3.0 * typical_ohm)

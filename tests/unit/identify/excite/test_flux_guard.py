@@ -76,6 +76,22 @@ def test_the_amplitude_for_a_known_machine_keeps_its_flux_below_the_limit_and_us
     assert true_peak_wb(off, excitation, scale, 5.0) < 0.9
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_no_command_below_a_direct_voltage_makes_more_flux_than_that_voltage(seed):
+    rng = np.random.default_rng(seed)
+    hz = np.exp(rng.uniform(np.log(0.05), np.log(20.0), 4))
+    tones = tuple(
+        Tone(a, f, p) for a, f, p in zip(rng.uniform(2.0, 20.0, 4), hz, rng.uniform(0.0, 6.28, 4), strict=True)
+    )
+    excitation, held_v = Excitation(tones, 0.0, 8.0), 12.0
+    limit_wb = (
+        held_v / MACHINE.stator_resistance_ohm * (MACHINE.leakage_inductance_h + MACHINE.magnetizing_inductance_h)
+    )
+    guard = FluxGuard(limit_wb, 0.02, excitation, 2e-4, 0.62, held_v=held_v)
+    assert true_peak_wb(MACHINE, excitation, guard.safe_scale, 5.0) < limit_wb
+    assert guard.safe_scale * excitation.peaks_v >= 0.999 * held_v or guard.safe_scale == 1.0
+
+
 LARGE = InverseGamma(0.0629, 0.105, 0.0036, 0.056)  # 19 kW; its inverter loses several times R_s I
 LOSS = knee_shape(14.4, 0.5, 5.0)
 LARGE_TONES = (Tone(17.6, 1.0, 0.0), Tone(18.4, 3.1, 0.2), Tone(2.5, 22.9, 0.2))
