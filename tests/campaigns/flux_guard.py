@@ -139,7 +139,7 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
         limit_wb, latency, chosen.excitation, PERIOD_S, resistance, known, axis_deg,
         current_a=test_a, trip_a=trip_a, held_v=held_v,
     )  # fmt: skip
-    first = min(FIRST_SCALE, guard.safe_scale)
+    first = min(FIRST_SCALE, guard.first_scale)
     if knowledge == "measured":
         first = guard.begin_known(start, log_std, RAMP_PER_S)
     played = _Played(truth, axis_deg, chosen.excitation, first)

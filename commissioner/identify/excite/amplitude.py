@@ -48,15 +48,22 @@ class Amplitude:
         """The scale at which no motor whatever can pass the flux limit.
 
         Either flux stays below it even without resistance and inverter, or the whole command stays inside the measured
-        dead band (`SURE_LOSS` of it), where no current flows, or below a direct voltage that was held. The first two do not add up: fast tones
-        carry slow ones across. The last: with I the current that V drives in the end, a stator current of I lets the flux rise no more
-        (u - R_s I - F(I) <= 0 for every u <= V), and the rotor's flux follows the current, so neither ever passes what V makes.
+        dead band (`SURE_LOSS` of it), where no current flows. The two do not add up: fast tones carry slow ones across.
         """
-        bounds_v = max(SURE_LOSS * self.plateau_v, self.held_v)
-        return min(
-            1.0,
-            max(self.limit_wb / max(self._bound_wb(), 1e-12), bounds_v / max(self.forecast.excitation.peaks_v, 1e-12)),
-        )
+        return min(1.0, max(self.limit_wb / max(self._bound_wb(), 1e-12), self._below(SURE_LOSS * self.plateau_v)))
+
+    @property
+    def first(self) -> float:
+        """The scale to begin with on a motor of which the direct voltage alone is known: at which it cannot pass the limit either.
+
+        With I the current that V drives in the end, a stator current of I lets the flux rise no more (u - R_s I - F(I) <= 0 for every
+        u <= V), and the rotor's flux follows the current: neither ever passes what V makes.
+        """
+        return max(self.safe, self._below(self.held_v))
+
+    def _below(self, voltage_v: float) -> float:
+        """The scale at which no peak of the command passes this voltage; 1 at the most."""
+        return min(1.0, voltage_v / max(self.forecast.excitation.peaks_v, 1e-12))
 
     def _bound_wb(self) -> float:
         """Sum of A / omega (1 + |sin phase|): flux of a machine without resistance, started from rest at full scale."""

@@ -115,6 +115,11 @@ class FluxGuard:
         """The scale at which no motor whatever can pass the flux limit."""
         return self._amplitude.safe
 
+    @property
+    def first_scale(self) -> float:
+        """The scale to begin with on a motor that was given a direct voltage before."""
+        return self._amplitude.first
+
     def begin_known(self, machine: InverseGamma, log_std: float, ramp_per_s: float) -> float:
         """The scale to begin with on a machine measured before to `log_std`."""
         self._share = 1.0
@@ -184,7 +189,7 @@ class FluxGuard:
     # -- amplitude ------------------------------------------------------------------------------------------------
 
     def _permit(self, estimate: BlockEstimate, scale: float, time_s: float, current_a: Signal) -> float:
-        safe = TARGET * self.safe_scale
+        safe = TARGET * self.first_scale
         rested_s = time_s - self._scale_since_s
         if rested_s < max(self._window_s, self.latency_s + self.reaction_s):
             return max(min(scale, self._granted), safe)

@@ -68,7 +68,7 @@ class UnderTest:
             inverter, axis_deg, current_a=aimed_current_a(job, findings), trip_a=tripping_current_a(job, findings),
             held_v=findings.held_v,
         )  # fmt: skip
-        first = min(job.plan.excitation.first_scale, self._guard.safe_scale)
+        first = min(job.plan.excitation.first_scale, self._guard.first_scale)
         if findings.is_measured:
             first = self._guard.begin_known(start, log_std, job.scale_ramp_per_s)
         self.scale = self._most_asked = first

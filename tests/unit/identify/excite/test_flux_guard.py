@@ -88,8 +88,8 @@ def test_no_command_below_a_direct_voltage_makes_more_flux_than_that_voltage(see
         held_v / MACHINE.stator_resistance_ohm * (MACHINE.leakage_inductance_h + MACHINE.magnetizing_inductance_h)
     )
     guard = FluxGuard(limit_wb, 0.02, excitation, 2e-4, 0.62, held_v=held_v)
-    assert true_peak_wb(MACHINE, excitation, guard.safe_scale, 5.0) < limit_wb
-    assert guard.safe_scale * excitation.peaks_v >= 0.999 * held_v or guard.safe_scale == 1.0
+    assert true_peak_wb(MACHINE, excitation, guard.first_scale, 5.0) < limit_wb
+    assert guard.first_scale * excitation.peaks_v >= 0.999 * held_v or guard.first_scale == 1.0
 
 
 LARGE = InverseGamma(0.0629, 0.105, 0.0036, 0.056)  # 19 kW; its inverter loses several times R_s I
