@@ -23,7 +23,7 @@ from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
-from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.reading.layout import empty, head_lines, split
 from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
 from commissioner.recordings.reading.mend import (
     TIME_MADE,
@@ -41,7 +41,7 @@ from commissioner.recordings.reading.mend import (
     without_empty_columns,
     without_untimed_rows,
 )
-from commissioner.recordings.reading.preface import Clock, clock_in, factors_said
+from commissioner.recordings.reading.preface import Clock, clock_in, factors_said, units_said
 from commissioner.recordings.reading.recognise import Recognised, quantity, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
 from commissioner.recordings.sheet_names import is_sheet
@@ -132,6 +132,8 @@ def _without_voltages(table: Table) -> Table:
 def _read(path: Path, mapping: ChannelMap) -> Table:
     if not path.is_file():
         raise no_file(path, "read recording")
+    if path.stat().st_size == 0:
+        raise empty(str(path))
     suffix = path.suffix.lower()
     if suffix in NOT_READ:
         kind, remedy = NOT_READ[suffix]
@@ -220,6 +222,7 @@ def _of_binary(path: Path, mapping: ChannelMap) -> Table:
     found = recognise(
         list(names.values()), [unit_in(n) for n in several], list(several.values()),
         {**mapping_in({}, tuple(names.values())), **mapping.columns}, str(path),
+        units_said([(k, str(v), "") for k, v in said_beside.items()], ()),
     )  # fmt: skip
     return _table(found, metadata, clock, mapping, str(path), notes)
 
@@ -233,8 +236,10 @@ def _own_name(name: str) -> str:
 def _of_table(table: Table, mapping: ChannelMap) -> Table:
     names = tuple(table.columns)
     targets = {**mapping_in(table.metadata, names), **mapping.columns}
-    found = recognise(names, ["" for _ in names], list(table.columns.values()), targets, table.source)
-    clock = clock_in((k, str(v), "") for k, v in table.metadata.items())
+    pairs = [(k, str(v), "") for k, v in table.metadata.items()]
+    said = units_said(pairs, [*table.comments, *(f"{k}: {v}" for k, v, _ in pairs)])
+    found = recognise(names, ["" for _ in names], list(table.columns.values()), targets, table.source, said)
+    clock = clock_in(pairs)
     period = table.metadata.get("sample_period_s")
     clock = replace(clock, interval_s=period, said_by="sample_period_s") if isinstance(period, float) else clock
     notes = factors_said([[key, str(value)] for key, value in table.metadata.items()])
@@ -247,7 +252,7 @@ def _of_text(path: Path, mapping: ChannelMap) -> Table:
     del text
     metadata = typed_metadata(path, raw.metadata)
     targets = {**mapping_in(metadata, raw.names), **mapping.columns}
-    found = recognise(raw.names, raw.units, list(raw.values), targets, str(path))
+    found = recognise(raw.names, raw.units, list(raw.values), targets, str(path), raw.units_said)
     return _table(found, metadata, raw.clock, mapping, str(path), raw.notes)
 
 

@@ -33,6 +33,9 @@ _OF_SAMPLES = re.compile(
 )
 """What a unit says beside itself that is so of every sample: `A peak`, `deg el.`"""
 PREFIX_WORD = {"milli": 1e-3, "mili": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9, "kilo": 1e3}
+MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
+            "_deg": "angle", "_nm": "torque"}  # fmt: skip
+"""What a column of the contract measures, by the ending of its name."""
 DAY_S = 86400
 NO_UNIT = frozenset({"", "-", "none", "sequence", "unit", "units"})
 """What stands in a row of units where a column has none."""
@@ -96,6 +99,13 @@ def _upper(prefix: str, base: str) -> Unit | None:
     """`US`, `NS`: capitals of micro and nano have no other meaning."""
     lower = prefix.lower()
     return Unit(BASE[base], PREFIX[lower]) if lower in {"u", "n"} and len(base) == 1 else None
+
+
+def measured_by(column: str) -> str | None:
+    """What a column of the contract measures; None of one without a unit."""
+    if column == "speed_rad_per_s":
+        return "speed"
+    return next((measures for ending, measures in MEASURES.items() if column.endswith(ending)), None)
 
 
 def is_temperature(text: str) -> bool:

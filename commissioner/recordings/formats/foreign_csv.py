@@ -22,16 +22,16 @@ from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import (
     Clock,
+    UnitSaid,
     clock_in,
     factors_said,
     metadata_of,
     pairs,
     probes_in,
-    units_in,
+    units_said,
 )
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
 from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
-from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
@@ -52,6 +52,7 @@ class RawTable:
     values: tuple[Signal, ...]
     metadata: dict[str, str]
     clock: Clock
+    units_said: Mapping[str, UnitSaid]
     notes: tuple[ReadingNote, ...]
 
 
@@ -87,20 +88,14 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
     notes += factors_said(layout.preface)
     names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
-    units = tuple(unit or _said_once(name, units_in(said)) for name, unit in zip(names, units, strict=True))
-    return RawTable(names, units, tuple(columns), _pointed(metadata_of(said), marks), clock, tuple(notes))
+    once = units_said(said, (" ; ".join(row) for row in layout.preface))
+    return RawTable(names, units, tuple(columns), _pointed(metadata_of(said), marks), clock, once, tuple(notes))
 
 
 def _pointed(metadata: Mapping[str, str], marks: Marks) -> dict[str, str]:
     """Numbers above the columns by the decimal mark of the file."""
     is_comma = marks.decimal == ","
     return {k: v.replace(",", ".") if is_comma and re.fullmatch(r"[+-]?\d+,\d+", v) else v for k, v in metadata.items()}
-
-
-def _said_once(name: str, units: Mapping[str, str]) -> str:
-    """The unit that stands once above the columns for all that measure the same; nothing of other columns."""
-    meaning = meaning_of(name) if units and name not in CONTRACT_COLUMNS else None
-    return next((unit for kind, unit in units.items() if meaning and meaning.startswith(kind)), "")
 
 
 def _sample(body: str, layout: Layout) -> list[str]:
