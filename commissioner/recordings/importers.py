@@ -44,7 +44,7 @@ from commissioner.recordings.reading.mend import (
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_said, units_said
 from commissioner.recordings.reading.recognise import Recognised, quantity, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
-from commissioner.recordings.sheet_names import is_sheet
+from commissioner.recordings.sheet_names import is_sheet, sheet_meaning
 from commissioner.recordings.standstill.components import along_axis, with_phases
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
@@ -315,7 +315,14 @@ def _of_one_length(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], li
 
 
 def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str], source: str) -> None:
-    """A standstill recording of one axis, or one segment, may say so once: `axis_deg: 60`, `Achse: 60 deg`, `axis_rad: 1.047`."""
+    """A standstill recording of one axis, or one segment, may say so once: `axis_deg: 60`, `Achse: 60 deg`, `axis_rad: 1.047`; so may
+    a test sheet of one frequency (`f: 50 Hz`)."""
+    if is_sheet(columns) and "frequency_hz" not in columns:
+        hertz = [
+            quantity(k, v, "frequency_hz", source) for k, v in metadata.items() if sheet_meaning(k) == "frequency_hz"
+        ]
+        if hertz and hertz[0] is not None:
+            columns["frequency_hz"] = np.full(max(v.size for v in columns.values()), hertz[0])
     rows = max((v.size for v in columns.values()), default=0)
     for key, said in metadata.items() if any(n.startswith("voltage_") for n in columns) else ():
         name = meaning_of(key)

@@ -32,6 +32,8 @@ from commissioner.recordings.reading.preface import (
 )
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
 from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
+from commissioner.recordings.sheets.indexed import in_rows
+from commissioner.recordings.sheets.upright import upright
 from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
@@ -70,6 +72,8 @@ def read_text(path: Path) -> tuple[str, str]:
 
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
+    turned = upright(text)
+    text = text if turned is None else turned
     layout = layout_of(text, source)
     if layout.is_split:
         raise DataRefused(
@@ -88,8 +92,16 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
     notes += factors_said(layout.preface)
     names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
+    if turned is not None:
+        notes.append(
+            ReadingNote(
+                "upright", "quantities stand down the rows: each column of numbers was taken as a point of the test"
+            )
+        )
+    names, units, points, of_tests = in_rows(names, units, columns)
+    notes += of_tests
     once = units_said(said, (" ; ".join(row) for row in layout.preface))
-    return RawTable(names, units, tuple(columns), _pointed(metadata_of(said), marks), clock, once, tuple(notes))
+    return RawTable(names, units, points, _pointed(metadata_of(said), marks), clock, once, tuple(notes))
 
 
 def _pointed(metadata: Mapping[str, str], marks: Marks) -> dict[str, str]:

@@ -206,6 +206,8 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
 def _cells_above(text: str, separator: str, width: int) -> Row:
     """The cells of a line above the numbers; by another separator where that gives one for each column and theirs does not."""
     bare = text.lstrip("\ufeff")
+    if separator == " " and bare.startswith("#") and SIGNS.match(bare.lstrip("# ")):
+        return [bare.lstrip("# ").strip()]  # its spaces separate nothing
     ways = [_said(bare, mark) for mark in dict.fromkeys((separator, ";", "\t", ","))]
     return next((row for row in ways if len(row) == width), ways[0])
 
