@@ -20,6 +20,7 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, mdf4, structures, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
+from commissioner.recordings.formats.kinds import require_kind
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
@@ -49,7 +50,6 @@ from commissioner.recordings.standstill.components import along_axis, with_phase
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,
-    READ,
     ColumnReading,
     Table,
     read_table,
@@ -69,14 +69,6 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
 }
 PLATE_KEYS = frozenset((*(one.name for one in fields(Nameplate)), "sample_period_s", "switching_frequency_hz"))
 """Numbers of a recording that stand beside its columns."""
-_EXPORT = "export the recording as CSV or Parquet"
-NOT_READ = {
-    ".mdf": ("MDF 3", _EXPORT),
-    ".h5": ("HDF5", _EXPORT),
-    ".hdf5": ("HDF5", _EXPORT),
-    ".toml": ("TOML", "give a nameplate by --motor, a mapping by --map, and the recording or the sheet as CSV"),
-}  # fmt: skip
-"""What the files are, and what to do."""
 HEAD_BYTES = 65536
 
 
@@ -135,11 +127,7 @@ def _read(path: Path, mapping: ChannelMap) -> Table:
     if path.stat().st_size == 0:
         raise empty(str(path))
     suffix = path.suffix.lower()
-    if suffix in NOT_READ:
-        kind, remedy = NOT_READ[suffix]
-        raise DataRefused(
-            f"{path}: {kind} files are not read", step="read recording", value=suffix, limit=READ, remedy=remedy,
-        )  # fmt: skip
+    require_kind(path, workbook.ENDINGS)
     if suffix in workbook.ENDINGS:
         return _of_text(path, mapping)
     if suffix in _BINARY:

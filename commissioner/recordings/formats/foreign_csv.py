@@ -15,6 +15,7 @@ import pyarrow.csv as pa_csv
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
 from commissioner.recordings.formats import workbook
+from commissioner.recordings.formats.kinds import is_text
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import Marks, is_number, marks_of, plain, to_numbers
@@ -60,7 +61,7 @@ class RawTable:
 
 def read_text(path: Path) -> tuple[str, str]:
     """(text with plain numbers, encoding) of a file within its limits; DataRefused where it cannot be unpacked."""
-    if path.suffix.lower() in workbook.ENDINGS:
+    if path.suffix.lower() in workbook.ENDINGS and not is_text(path):
         return plain(workbook.text_of(path)), "UTF-8"
     try:
         data = bounded_text(path, MAX_FOREIGN_BYTES)

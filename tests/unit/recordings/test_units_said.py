@@ -190,3 +190,18 @@ def test_a_file_without_rows_says_why(tmp_path, text, says):
     (tmp_path / "x.csv").write_text(text, encoding="utf-8")
     with pytest.raises(DataRefused, match=says):
         contract_table(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("02/03/2026 23:59:59", "02/04/2026 00:00:00"), ("01/12/2026 23:59:59", "01/13/2026 00:00:00"), ("03.02.2026 23:59:59", "04.02.2026 00:00:00"),
+     ("12/31/2025 23:59:59", "01/01/2026 00:00:00"), ("31/01/2026 23:59:59", "01/02/2026 00:00:00"), ("01/31/26 11:59:59 PM", "02/01/26 12:00:00 AM"),
+     ("04/05/2026 10:00:00", "04/05/2026 10:00:01")],
+)  # fmt: skip
+def test_a_date_that_passes_midnight_has_its_day_where_one_second_passes(tmp_path, first, second):
+    def stamps(k):
+        date, clock, *half = (first if k < 20 else second).split(" ")
+        return " ".join([date, f"{clock}.{(k % 20) * 50:03d}", *half])
+
+    path = written(tmp_path / "x.csv", ["time,ia,ib,uab,ubc"], [stamps(k) for k in range(TIME.size)])
+    np.testing.assert_allclose(np.diff(contract_table(path).columns["time_s"]), 0.05, atol=1e-5)
