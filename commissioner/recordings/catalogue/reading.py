@@ -52,7 +52,7 @@ AT_LOADS = re.compile(rf"^\s*({_SHARE}(?:\s*%?(?:\s*[;/|–-]\s*|\s+){_SHARE}){{
 FALLING = ("", "_75", "_50")
 """Loads of three values whose order nobody says, as most sheets have them."""
 
-_AT = re.compile(r"[\[(,]?\s*(?:\b(?:at|bei|à|a)\s|@)?\s*([-+]?\d+(?:[.,]\d+)?)\s*°\s*C\s*[\])]?", re.IGNORECASE)
+_AT = re.compile(r"[\[(,]?\s*(?:\b(?:at|bei|à|a)\s|@)?\s*([-+]?\d+(?:[.,]\d+)?)\s*°\s*([CF])\s*[\])]?", re.IGNORECASE)
 """The temperature of a winding's resistance, in its name or behind its value."""
 
 
@@ -187,7 +187,7 @@ def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:
 def _read(entry: Entry, sheet: Sheet, unsaid: list[str], remarks: list[str]) -> Iterator[tuple[str, Value]]:
     """The values of one entry, with their keys."""
     if entry.key == "winding_resistance" and (at := _AT.search(f"{entry.name} {entry.printed}")) is not None:
-        yield "winding_temperature_c", value_of("winding_temperature_c", at[1], "°C", entry.name, sheet.source)
+        yield "winding_temperature_c", value_of("winding_temperature_c", at[1], f"°{at[2]}", entry.name, sheet.source)
         entry = replace(entry, name=_AT.sub("", entry.name), printed=_AT.sub("", entry.printed))
     if entry.key in ("efficiency", "power_factor") and (at_loads := _at_loads(entry, sheet.source, remarks)):
         yield from at_loads

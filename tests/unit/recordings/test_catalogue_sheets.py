@@ -319,3 +319,18 @@ def test_pound_feet_squared_are_a_mass_times_a_radius_squared(tmp_path):
     for name in ("WK2", "Rotor inertia"):
         sheet = read(tmp_path, PLAIN + f"{name}: 0.19 lb ft²\n")
         assert sheet.values["inertia_kg_m2"].value == pytest.approx(0.19 * 0.45359237 * 0.3048**2, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "R_UV at 68 °F: 3.1 Ohm",
+        "R_UV: 3.1 Ohm @ 68 °F",
+        "R_UV: 3.1 Ohm\nTemperature: 68 degF",
+        "R_UV: 3.1 Ohm\nTemperature: 293.15 K",
+    ],
+)
+def test_a_temperature_has_its_zero(tmp_path, line):
+    sheet = read(tmp_path, PLAIN + line + "\n")
+    assert sheet.values["winding_temperature_c"].value == pytest.approx(20.0)
+    assert sheet.values["winding_resistance_uv_ohm"].value == pytest.approx(3.1)

@@ -205,3 +205,15 @@ def test_a_date_that_passes_midnight_has_its_day_where_one_second_passes(tmp_pat
 
     path = written(tmp_path / "x.csv", ["time,ia,ib,uab,ubc"], [stamps(k) for k in range(TIME.size)])
     np.testing.assert_allclose(np.diff(contract_table(path).columns["time_s"]), 0.05, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("unit", "printed", "celsius"), [("°F", 212.0, 100.0), ("degF", 32.0, 0.0), ("K", 293.15, 20.0), ("°C", 40.0, 40.0)]
+)
+def test_a_temperature_is_known_with_its_zero_and_is_no_time(tmp_path, unit, printed, celsius):
+    known = read_unit(unit)
+    assert known.measures == "temperature" and known.scale * printed + known.offset == pytest.approx(celsius)
+    columns = contract_table(
+        written(tmp_path / "x.csv", ["# sample_period_s: 0.0002", f"T [{unit}],ia,ib,uab,ubc"], 20 + TIME)
+    ).columns
+    assert columns["time_s"][1] == pytest.approx(2e-4)
