@@ -156,7 +156,7 @@ def _units_in_lines(cells: Iterable[str]) -> Mapping[str, UnitSaid]:
     of what is said in two units, or with a value (`rated current in mA: 4860`), nothing."""
     found: dict[str, list[UnitSaid]] = {}
     for cell in cells:
-        for one in _IN_UNIT.finditer(" ".join(translated(cell).split())):
+        for one in _IN_UNIT.finditer(" ".join(translated(cell.replace("：", ":")).split())):
             unit = read_unit(one["unit"])
             if unit and unit.measures == _measured(one["what"]):
                 found.setdefault(unit.measures, []).append(UnitSaid(one["unit"], cell.strip().lstrip("# ")))
@@ -198,7 +198,7 @@ _NOUN = re.compile(
     r"|(?P<time>(?:times?|zeit(?:en)?|temps)$|^t$)|(?P<power>(?:powers?|leistung(?:en)?)$|^p$)|(?P<speed>(?:speeds?|drehzahl)$)"
 )
 _IN_UNIT = re.compile(
-    r"(?<!\w)(?P<what>[^\W\d]\w*)(?: (?:is|are|was|were|given|measured|recorded|stored|values?|samples|all|sind|ist|werte?|angegeben|gemessen|sont))*"
+    r"(?<!\w)(?P<what>[^\W\d]\w*)(?: (?:units?|einheit|单位|is|are|was|were|given|measured|recorded|stored|values?|samples|all|sind|ist|werte?|angegeben|gemessen|sont))*"
     r"\s*(?:(?<!\w)(?:in|en)(?!\w)|[:=(\[])\s*\(?\[?(?P<unit>[^\W\d][^\s,;.:()\[\]]*)(?![^\s,;.:)\]])(?![)\]]?\s*[:=;]?\s*[-+]?\d)",
     re.IGNORECASE,
 )

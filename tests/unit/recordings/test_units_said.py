@@ -144,7 +144,7 @@ def test_units_in_words():
 
 OURS = "time_s,current_u_a,current_v_a,voltage_uv_v,voltage_vw_v"
 LINES = ["currents in mA", "all currents are in milliamperes, voltages in V", "Ströme in mA", "currents [mA]", "unit of current: mA",
-         "Current unit: mA", "current: mA", "current_u_a in mA", "Les courants sont en mA", "corrientes: mA", "I in mA"]  # fmt: skip
+         "Current unit: mA", "current: mA", "current_u_a in mA", "Les courants sont en mA", "corrientes: mA", "I in mA", "电流单位：mA"]  # fmt: skip
 
 
 @pytest.mark.parametrize("line", LINES)
