@@ -18,6 +18,7 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import BatchFit, extended
 from commissioner.identify.batch.starts import periods_late
+from commissioner.identify.batch.whiteness import holds_noise
 from commissioner.identify.estimate.axes import AxisEstimate, Combined, combine
 from commissioner.identify.estimate.axis import (
     LARGEST_DISAGREEMENT,
@@ -315,6 +316,11 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
                 f"axis {result.axis_deg:g} deg: the residual is not white ({result.whiteness.statistic:.0f}, limit "
                 f"{result.whiteness.limit}); standard errors are widened for it"
             )
+    if any(not (r.whiteness.is_white or holds_noise(r.batch.residuals, r.residual_rms_a)) for r in results):
+        remarks.append(
+            "the currents hold no noise, as no sensor gives them: of such a played recording the residual is what its solver and its "
+            "digits leave, and is never white; `commissioner simulate --noise-a` adds a sensor's noise"
+        )
     remarks.append(
         f"L_M holds at a peak stator flux of {flux_wb:.3g} Wb, {flux_wb / rated.stator_peak_wb:.0%} of the rated"
         + (" one, and is not extrapolated" if flux_wb < 0.7 * rated.stator_peak_wb else " one")

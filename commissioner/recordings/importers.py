@@ -20,10 +20,11 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, mdf4, structures, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
+from commissioner.recordings.formats.kinds import require_kind
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
-from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.reading.layout import empty, head_lines, split
 from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
 from commissioner.recordings.reading.mend import (
     TIME_MADE,
@@ -41,15 +42,14 @@ from commissioner.recordings.reading.mend import (
     without_empty_columns,
     without_untimed_rows,
 )
-from commissioner.recordings.reading.preface import Clock, clock_in, factors_said
+from commissioner.recordings.reading.preface import Clock, clock_in, factors_said, units_said
 from commissioner.recordings.reading.recognise import Recognised, quantity, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
-from commissioner.recordings.sheet_names import is_sheet
+from commissioner.recordings.sheet_names import is_sheet, sheet_meaning
 from commissioner.recordings.standstill.components import along_axis, with_phases
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,
-    READ,
     ColumnReading,
     Table,
     read_table,
@@ -69,14 +69,6 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
 }
 PLATE_KEYS = frozenset((*(one.name for one in fields(Nameplate)), "sample_period_s", "switching_frequency_hz"))
 """Numbers of a recording that stand beside its columns."""
-_EXPORT = "export the recording as CSV or Parquet"
-NOT_READ = {
-    ".mdf": ("MDF 3", _EXPORT),
-    ".h5": ("HDF5", _EXPORT),
-    ".hdf5": ("HDF5", _EXPORT),
-    ".toml": ("TOML", "give a nameplate by --motor, a mapping by --map, and the recording or the sheet as CSV"),
-}  # fmt: skip
-"""What the files are, and what to do."""
 HEAD_BYTES = 65536
 
 
@@ -132,12 +124,10 @@ def _without_voltages(table: Table) -> Table:
 def _read(path: Path, mapping: ChannelMap) -> Table:
     if not path.is_file():
         raise no_file(path, "read recording")
+    if path.stat().st_size == 0:
+        raise empty(str(path))
     suffix = path.suffix.lower()
-    if suffix in NOT_READ:
-        kind, remedy = NOT_READ[suffix]
-        raise DataRefused(
-            f"{path}: {kind} files are not read", step="read recording", value=suffix, limit=READ, remedy=remedy,
-        )  # fmt: skip
+    require_kind(path, workbook.ENDINGS)
     if suffix in workbook.ENDINGS:
         return _of_text(path, mapping)
     if suffix in _BINARY:
@@ -220,6 +210,7 @@ def _of_binary(path: Path, mapping: ChannelMap) -> Table:
     found = recognise(
         list(names.values()), [unit_in(n) for n in several], list(several.values()),
         {**mapping_in({}, tuple(names.values())), **mapping.columns}, str(path),
+        units_said([(k, str(v), "") for k, v in said_beside.items()], ()),
     )  # fmt: skip
     return _table(found, metadata, clock, mapping, str(path), notes)
 
@@ -233,8 +224,10 @@ def _own_name(name: str) -> str:
 def _of_table(table: Table, mapping: ChannelMap) -> Table:
     names = tuple(table.columns)
     targets = {**mapping_in(table.metadata, names), **mapping.columns}
-    found = recognise(names, ["" for _ in names], list(table.columns.values()), targets, table.source)
-    clock = clock_in((k, str(v), "") for k, v in table.metadata.items())
+    pairs = [(k, str(v), "") for k, v in table.metadata.items()]
+    said = units_said(pairs, [*table.comments, *(f"{k}: {v}" for k, v, _ in pairs)])
+    found = recognise(names, ["" for _ in names], list(table.columns.values()), targets, table.source, said)
+    clock = clock_in(pairs)
     period = table.metadata.get("sample_period_s")
     clock = replace(clock, interval_s=period, said_by="sample_period_s") if isinstance(period, float) else clock
     notes = factors_said([[key, str(value)] for key, value in table.metadata.items()])
@@ -247,7 +240,7 @@ def _of_text(path: Path, mapping: ChannelMap) -> Table:
     del text
     metadata = typed_metadata(path, raw.metadata)
     targets = {**mapping_in(metadata, raw.names), **mapping.columns}
-    found = recognise(raw.names, raw.units, list(raw.values), targets, str(path))
+    found = recognise(raw.names, raw.units, list(raw.values), targets, str(path), raw.units_said)
     return _table(found, metadata, raw.clock, mapping, str(path), raw.notes)
 
 
@@ -310,7 +303,14 @@ def _of_one_length(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], li
 
 
 def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str], source: str) -> None:
-    """A standstill recording of one axis, or one segment, may say so once: `axis_deg: 60`, `Achse: 60 deg`, `axis_rad: 1.047`."""
+    """A standstill recording of one axis, or one segment, may say so once: `axis_deg: 60`, `Achse: 60 deg`, `axis_rad: 1.047`; so may
+    a test sheet of one frequency (`f: 50 Hz`)."""
+    if is_sheet(columns) and "frequency_hz" not in columns:
+        hertz = [
+            quantity(k, v, "frequency_hz", source) for k, v in metadata.items() if sheet_meaning(k) == "frequency_hz"
+        ]
+        if hertz and hertz[0] is not None:
+            columns["frequency_hz"] = np.full(max(v.size for v in columns.values()), hertz[0])
     rows = max((v.size for v in columns.values()), default=0)
     for key, said in metadata.items() if any(n.startswith("voltage_") for n in columns) else ():
         name = meaning_of(key)

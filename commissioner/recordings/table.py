@@ -79,6 +79,8 @@ class Table:
     source: str
     notes: tuple[ReadingNote, ...] = ()
     readings: tuple[ColumnReading, ...] = ()
+    comments: tuple[str, ...] = ()
+    """Lines above the columns that are no key with its value."""
 
     @property
     def is_running(self) -> bool:
@@ -390,6 +392,7 @@ def _read_csv(path: Path) -> Table:
     data = bounded_text(path)
     text = io.BytesIO(data)
     metadata: dict[str, str] = {}
+    comments: list[str] = []
     start = 0
     for _ in range(MAX_METADATA_LINES):
         line = text.readline(65536)
@@ -398,6 +401,8 @@ def _read_csv(path: Path) -> Table:
         start = text.tell()
         if said := KEY_AND_VALUE.match(line[1:].decode("utf-8")):
             metadata[said[1].strip()] = said[2].strip()
+        else:
+            comments.append(line[1:].decode("utf-8").strip())
     text.seek(start)
     columns = text.readline().count(b",") + 1
     if columns > MAX_COLUMNS:
@@ -408,7 +413,7 @@ def _read_csv(path: Path) -> Table:
         read_options=pa_csv.ReadOptions(use_threads=False),
         convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]),
     )
-    return _as_table(path, table, typed_metadata(path, metadata))
+    return replace(_as_table(path, table, typed_metadata(path, metadata)), comments=tuple(comments))
 
 
 def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) -> Table:

@@ -23,7 +23,7 @@ WHOLE = {
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
     "°": ("angle", 1.0), "rev": ("angle", 360.0), "turn": ("angle", 360.0), "turns": ("angle", 360.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
     "grad": ("angle", 1.0), "grados": ("angle", 1.0), "gradi": ("angle", 1.0), "degrés": ("angle", 1.0), "rad": ("angle", 180.0 / math.pi),
-    "°c": ("temperature", 1.0), "degc": ("temperature", 1.0), "°f": ("temperature", 1.0), "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
+    "°c": ("temperature", 1.0), "degc": ("temperature", 1.0), "℃": ("temperature", 1.0), "celsius": ("temperature", 1.0), "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
     "微秒": ("time", 1e-6), "安": ("current", 1.0), "毫安": ("current", 1e-3), "伏": ("voltage", 1.0),
     "с": ("time", 1.0), "мс": ("time", 1e-3), "мкс": ("time", 1e-6), "а": ("current", 1.0), "ма": ("current", 1e-3),
     "в": ("voltage", 1.0), "кв": ("voltage", 1e3), "ka": ("current", 1e3), "kv": ("voltage", 1e3),
@@ -32,7 +32,12 @@ _OF_SAMPLES = re.compile(
     r"(?<=[av])[\s_(]*(?:pk|peak|inst)\)?$|(?<=[a-z°])\.?[\s_(]*el(?:ec(?:tr(?:ical)?)?)?\.?\)?$", re.IGNORECASE
 )
 """What a unit says beside itself that is so of every sample: `A peak`, `deg el.`"""
+FAHRENHEIT = frozenset({"°f", "degf", "℉", "fahrenheit", "deg f"})
+KELVIN = frozenset({"k", "kelvin"})
 PREFIX_WORD = {"milli": 1e-3, "mili": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9, "kilo": 1e3}
+MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
+            "_deg": "angle", "_nm": "torque"}  # fmt: skip
+"""What a column of the contract measures, by the ending of its name."""
 DAY_S = 86400
 NO_UNIT = frozenset({"", "-", "none", "sequence", "unit", "units"})
 """What stands in a row of units where a column has none."""
@@ -49,11 +54,13 @@ _BRACKETS = re.compile(r"[\[(（【][^\])）】]*[\])）】]\s*$")
 
 @dataclass(frozen=True)
 class Unit:
-    """What a unit measures, and its factor to SI. `is_ambiguous`: mega or milli, which only the writer knows."""
+    """What a unit measures, and its factor to SI (of temperatures to degrees Celsius, behind which `offset` is added). `is_ambiguous`:
+    mega or milli, which only the writer knows."""
 
     measures: str
     scale: float
     is_ambiguous: bool = False
+    offset: float = 0.0
 
 
 def unit_in(name: str) -> str:
@@ -79,6 +86,10 @@ def read_unit(text: str) -> Unit | None:
     whole = WHOLE.get(bare.lower())
     if whole:
         return Unit(*whole)
+    if bare.lower() in FAHRENHEIT:
+        return Unit("temperature", 5.0 / 9.0, offset=-160.0 / 9.0)
+    if bare.lower() in KELVIN:
+        return Unit("temperature", 1.0, offset=-273.15)
     if bare.lower() in BASE:
         return Unit(BASE[bare.lower()], 1.0)
     for word, scale in PREFIX_WORD.items():
@@ -96,6 +107,13 @@ def _upper(prefix: str, base: str) -> Unit | None:
     """`US`, `NS`: capitals of micro and nano have no other meaning."""
     lower = prefix.lower()
     return Unit(BASE[base], PREFIX[lower]) if lower in {"u", "n"} and len(base) == 1 else None
+
+
+def measured_by(column: str) -> str | None:
+    """What a column of the contract measures; None of one without a unit."""
+    if column == "speed_rad_per_s":
+        return "speed"
+    return next((measures for ending, measures in MEASURES.items() if column.endswith(ending)), None)
 
 
 def is_temperature(text: str) -> bool:

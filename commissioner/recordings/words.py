@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 TRANSLATED = {
     "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
-    "电流": "current", "電流": "current", "corriente": "current", "intensidad": "current", "corrente": "current", "stroom": "current",
+    "电流": "current", "電流": "current", "corriente": "current", "corrientes": "current", "correntes": "current", "tensiones": "voltage", "tensões": "voltage", "intensidad": "current", "corrente": "current", "stroom": "current",
     "ток": "current", "strom": "strom", "ström": "current", "prad": "current", "prąd": "current",
     "电压": "voltage", "電圧": "voltage", "電壓": "voltage", "tensión": "voltage", "tensão": "voltage",
     "tensione": "voltage", "tensioni": "voltage", "correnti": "current", "voltaje": "voltage", "spanning": "voltage", "напряжение": "voltage",

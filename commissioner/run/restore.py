@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from commissioner.errors import DataRefused, IdentityMismatch, UsageError
+from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import archived_profile
@@ -77,7 +77,15 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
         OperatorStop(),  # a set is never left half written for a Ctrl-C
     ):
         lock.name_run(folder.name)
-        port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
+        try:
+            port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
+        except LinkUnreachable as silent:
+            if url is None and snapshot.identity.drive_type.startswith("SIM"):
+                silent.remedy = (
+                    "the run's drive was a simulated one, which ends with the demo and takes its values along: nothing is left to restore; "
+                    "where one runs still, give its address with --drive"
+                )
+            raise
         with closing(port):
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
             with Mastery(inverter, lock) as mastery:

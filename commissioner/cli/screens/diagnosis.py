@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 
 from commissioner.cli.screens.screen import out as screen
-from commissioner.cli.screens.screen import table
+from commissioner.cli.screens.screen import signs, table
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.report.diagnosis.names import (
     class_name,
@@ -65,7 +65,7 @@ def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
     if not (is_on_page and _is_only_together(document)):
         _next(document)
     for sentence in (*remarks(document), *document.get("audit", ())):
-        screen.print(f"[dim]{escape(said(sentence))}[/]")
+        screen.print(f"[dim]{escape(signs(said(sentence)))}[/]")
 
 
 def _is_only_together(document: Mapping[str, Any]) -> bool:

@@ -18,7 +18,7 @@ def _title(sources: Sequence[str]) -> str:
 
 def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     """The result as a table for a technician, with what holds for which flux, and the remarks."""
-    from commissioner.cli.screens.screen import out, table
+    from commissioner.cli.screens.screen import out, signs, table
 
     rows = []
     for q in FIVE:
@@ -43,12 +43,12 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
             f"- {finding['sentence']}: {finding['relative_size']:+.2%} ± {half_width(finding['relative_std']):.2%}"
         )
     for remark in document["remarks"]:
-        out.print(f"- {remark}", markup=False)
+        out.print(f"- {signs(remark)}", markup=False)
 
 
 def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     """Of a running motor: the same table with what the noise alone allows, inertia and load of a start, remarks."""
-    from commissioner.cli.screens.screen import out, table
+    from commissioner.cli.screens.screen import out, signs, table
 
     rows = []
     for q in FIVE:
@@ -72,12 +72,12 @@ def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     for name, value in document["load"].items():
         out.print(f"load of the start: {name.replace('_', ' ').removesuffix(' nm')} {value:.3g} N m")
     for remark in document["remarks"]:
-        out.print(f"- {remark}", markup=False)
+        out.print(f"- {signs(remark)}", markup=False)
 
 
 def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     """Of test sheets: the circuit as terminals have it, as a T, and by the textbook's approximations; what was assumed."""
-    from commissioner.cli.screens.screen import out, table
+    from commissioner.cli.screens.screen import out, signs, table
 
     rows = []
     for q in FIVE:
@@ -103,12 +103,12 @@ def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     out.print(table("", heads, lines, right=(1, 2)))
     out.print(f"Method: {document['method']}.")
     for remark in document["remarks"]:
-        out.print(f"- {remark}", markup=False)
+        out.print(f"- {signs(remark)}", markup=False)
 
 
 def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_folder: Path | None = None) -> None:
     """Of a manufacturer's sheet: the four with both errors, the circuits, each value beside the circuit's, what stays open."""
-    from commissioner.cli.screens.screen import out, table
+    from commissioner.cli.screens.screen import out, signs, table
 
     found = document["parameters"]
     rows = [(q.name, *_with_errors(found[q.field], q.factor), q.unit) for q in FIVE if q.field in found]
@@ -130,7 +130,7 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
            for v in document["values"]]  # fmt: skip
     out.print(table("", ("the sheet's values", "given", "circuit", "unit", ""), met))
     for remark in document["remarks"]:
-        out.print(f"- {remark}", markup=False)
+        out.print(f"- {signs(remark)}", markup=False)
     if out_folder is not None:
         out.print(f"report    {out_folder / 'report.html'}", markup=False, soft_wrap=True)
 

@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 
 from commissioner.cli.screens.screen import out as screen
-from commissioner.cli.screens.screen import table
+from commissioner.cli.screens.screen import signs, table
 from commissioner.report.running.words import actions, class_name, headline, meaning, number, quantity, spoken, tone
 
 COLOURS = {"good": "green", "warn": "yellow", "bad": "red"}
@@ -43,6 +43,6 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
         limits = [f"{spoken(n)} from {quantity({**v, 'std': None})}" for n, v in document["detection_limits"].items()]
         screen.print(f"[dim]would have been seen: {', '.join(limits[:MOST_LIMITS])}[/]")
     for remark in document["remarks"]:
-        screen.print(f"[dim]{escape(remark)}[/]")
+        screen.print(f"[dim]{escape(signs(remark))}[/]")
     if out is not None:
         screen.print(f"[dim]report[/] {escape(str(out))}", soft_wrap=True)

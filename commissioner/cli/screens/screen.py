@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -81,9 +82,20 @@ def busy(doing: str) -> Iterator[None]:
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
     err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
-    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
+    remedy = once(error.remedy, error.limit)
+    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", remedy)):
         if fact not in (None, ""):
             err.print(f"  [dim]{name:<7}[/]{text(shown(fact, error.unit), SENTENCE)}")
+
+
+def once(remedy: str, limit: object) -> str:
+    """The remedy without the limit behind it, which stands in the line above: a file's error says there what is expected."""
+    return remedy.removesuffix(f": {limit}") if limit not in (None, "") else remedy
+
+
+def signs(sentence: str) -> str:
+    """A document's sentence with the signs that the tables beside it have; a console that lacks them spells them out."""
+    return re.sub(r"(\d) us\b", r"\1 µs", sentence.replace("+-", "±"))
 
 
 def text(value: object, longest: int = LONGEST) -> str:
@@ -166,6 +178,7 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
     error = document.get("error")
     if error:
+        error = {**error, "remedy": once(str(error.get("remedy") or ""), error.get("limit"))}
         for name in ("step", "value", "limit", "remedy"):
             if error.get(name) not in (None, ""):
                 out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name], error.get('unit', '')))}")
@@ -179,7 +192,7 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             )
         )
         for remark in (*finding_sentences(document), *document.get("remarks", ())):
-            out.print(f"  [dim]•[/] {escape(remark)}")
+            out.print(f"  [dim]•[/] {escape(signs(remark))}")
         if standing(document) == ACCEPTED:
             out.print(
                 "  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones"

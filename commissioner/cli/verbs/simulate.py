@@ -15,3 +15,5 @@ def simulate(request: SimulateRequest, *, as_json: bool) -> None:
         emit(done)
     else:
         err.print(f"{done.samples} samples in {done.segments} segments written to {text(done.recording)}")
+        for remark in done.remarks:
+            err.print(f"- {text(remark)}")

@@ -30,6 +30,10 @@ from commissioner.recordings.table import check_ending, read_table, to_standstil
 from commissioner.settings import load_motor, read_toml
 
 MAX_BYTES = 5_000_000
+WITHOUT_NOISE = (
+    "it holds no noise, as no sensor's recording does: `identify` will call its residual not white, for a solver's error is left over; "
+    "--noise-a gives the currents some, in A rms"
+)
 SAMPLE_PERIOD_S = 2e-4
 Command = list[tuple[float, Any]]
 """Axis in degrees and voltage along it, a segment each."""
@@ -58,6 +62,7 @@ class Simulated:
     samples: int
     segments: int
     effects: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
         samples, names = played(
             running, request.model, request.out, request.like, request.noise_a, request.seed, is_plain=request.plain
         )
-        return Simulated(str(request.out), samples, 1, names)
+        return Simulated(str(request.out), samples, 1, names, _remarks(request))
     motor = _motor(request.model, request.plain)
     facts = _facts(motor.plate)
     if request.like is None:
@@ -103,7 +108,12 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
     keys = {k: v for k, v in motor.plate.items() if isinstance(v, int | float | str) and k not in ("name", "scenario")}
     write_table(request.out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
     effects = tuple(sorted({t.effect for t in motor.model.terms if t.effect}))
-    return Simulated(str(request.out), int(columns["time_s"].shape[0]), len(segments), effects)
+    return Simulated(str(request.out), int(columns["time_s"].shape[0]), len(segments), effects, _remarks(request))
+
+
+def _remarks(request: SimulateRequest) -> tuple[str, ...]:
+    """What whoever reads the recording has to know of it."""
+    return (WITHOUT_NOISE,) if request.noise_a == 0.0 else ()
 
 
 def _running_model(name: str) -> Mapping[str, Any] | None:

@@ -30,7 +30,8 @@ NAMES = {
     "breakdown_torque": rf"(?:(?:breakdown|pullout|maximum|max|kipp)(?:torque|moment|drehmoment)|[mtc](?:k|max|b|m)|bdt){_OVER}",
     "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mt](?:s|u|pu)|c(?:u|pu)){_OVER}",
     "no_load_current_a": r"(?:noload|idle|leerlauf)(?:current|strom)|i0",
-    "inertia_kg_m2": r"(?:rotor|mass|massen)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)|momentofinertiaj|j|jm|jmot|jrotor",
+    "inertia_kg_m2": r"(?:rotor|mass|massen)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)|momentofinertiaj|j|jm|jmot|jrotor|j?gd2/4|(?:rotor)?w[kr]2",
+    "flywheel_effect": r"(?:rotor)?(?:(?:schwungmoment|flywheel(?:effect|moment))(?:[gp]d2)?|[gp]d2)",
     "winding_resistance": r"(?:winding|stator|stander|phase|wicklungs|strang|klemmen|terminal|line(?:toline)?)?(?:resistance|widerstand)\w*|r(?:uv|1|s|ph)\w*",
     "winding_temperature_c": r"(?:at|bei|reference|bezugs|mess|winding|resistance|wicklungs)?temperatu?re?|temperatur",
     "pole_pairs": r"pole?pairs?|polpaare|polpaarzahl|numberofpolepairs",
@@ -44,11 +45,20 @@ _GREEK = {"η": "eta", "φ": "phi", "ϕ": "phi", "ϑ": "temperature", "₀": "0"
 _SUFFIX = re.compile(r"(?<=[a-z])_(kw|w|hp|v|kv|hz|a|nm|rpm|ohm|c|pct|percent|kg_m2|kgm2)$", re.IGNORECASE)
 _OF_RATED = re.compile(r"[imtc]_?[a-z]{1,3}/[imtc]_?[nr]?", re.IGNORECASE)
 HALF_LOADS = {"3/4": "_75", "75": "_75", "2/4": "_50", "1/2": "_50", "50": "_50"}
+_LOAD_SAID = r"(?:4/4|3/4|2/4|1/1|1/2|1/4|5/4|125|100|75|50|25)"
 _LOADS = re.compile(
-    r"[\[(]?\s*(?:4/4|100|1/1)\s*%?\s*[/|,; -]+\s*(?:3/4|75)\s*%?\s*[/|,; -]+\s*(?:1/2|2/4|50)\s*%?\s*(?:load|last)?\s*[\])]?",
+    rf"[\[(]?\s*(?<![\d.,]){_LOAD_SAID}(?:\s*%?\s*(?:[/|,;-]|\s)\s*{_LOAD_SAID}){{1,4}}(?![\d.,])\s*%?\s*(?:load|last)?\s*[\])]?",
     re.IGNORECASE,
 )
-"""Three loads behind one name: `Efficiency 100/75/50 %`."""
+"""Loads behind one name, in any order: `Efficiency 100/75/50 %`."""
+_ENDINGS = {"4/4": "", "1/1": "", "100": "", **HALF_LOADS}
+
+
+def loads_in(name: str) -> tuple[str | None, ...]:
+    """The endings of the keys of several loads behind one name, in their order (None of a load that no key has); empty where it names
+    none, or one."""
+    found = _LOADS.search(name)
+    return tuple(_ENDINGS.get(load) for load in re.findall(_LOAD_SAID, found[0])) if found else ()
 
 
 def key_of(name: str) -> str | None:

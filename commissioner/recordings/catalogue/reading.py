@@ -15,7 +15,14 @@ from commissioner.errors import DataRefused
 from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS, Sheet, Value
 from commissioner.motor.nameplate import connection_of
 from commissioner.recordings.catalogue import names
-from commissioner.recordings.catalogue.cells import MEASURES, refused, split_unit, unit_key, value_of
+from commissioner.recordings.catalogue.cells import (
+    MEASURES,
+    inertia_of_flywheel,
+    refused,
+    split_unit,
+    unit_key,
+    value_of,
+)
 from commissioner.recordings.formats import workbook
 from commissioner.recordings.formats.foreign_csv import read_text
 from commissioner.recordings.names import meaning_of
@@ -39,9 +46,13 @@ PAIR = re.compile(
     r"^\s*(\d+(?:[.,]\d+)?)(?:\s*[A-Za-zΔ△]+)*\s*/\s*(\d+(?:[.,]\d+)?)[\s;]*([A-Za-z]{0,3}?)\s*(?:[DYΔ△](?:\s*/\s*[DYΔ△])?)?\s*$"
 )
 """`230/400 V`, `400/690 V D/Y`, `400 V D / 690 V Y`."""
-TRIPLE = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*(%?)[\s;]*$")
+_SHARE = r"\d+(?:[.,]\d+)?"
+AT_LOADS = re.compile(rf"^\s*({_SHARE}(?:\s*%?(?:\s*[;/|–-]\s*|\s+){_SHARE}){{1,4}})\s*(%?)[\s;]*$")
+"""Values at several loads in one cell."""
+FALLING = ("", "_75", "_50")
+"""Loads of three values whose order nobody says, as most sheets have them."""
 
-_AT = re.compile(r"[\[(,]?\s*(?:\b(?:at|bei|à|a)\s|@)?\s*([-+]?\d+(?:[.,]\d+)?)\s*°\s*C\s*[\])]?", re.IGNORECASE)
+_AT = re.compile(r"[\[(,]?\s*(?:\b(?:at|bei|à|a)\s|@)?\s*([-+]?\d+(?:[.,]\d+)?)\s*°\s*([CF])\s*[\])]?", re.IGNORECASE)
 """The temperature of a winding's resistance, in its name or behind its value."""
 
 
@@ -150,18 +161,22 @@ def _sheet(entries: Sequence[Entry], source: str) -> Sheet:
         {}, connection if connection in ("star", "delta") else "", words.get("design_class", "").upper()[-1:], source
     )
     unsaid: list[str] = []
+    read: list[str] = []
     for entry in entries:
         if entry.key in words:
             continue
-        for key, value in _read(entry, sheet, unsaid):
+        for key, value in _read(entry, sheet, unsaid, read):
             sheet = _with(sheet, key, value, entry.name)
     remarks = tuple(f"{name}: not said between which terminals it was measured, not used" for name in unsaid)
+    remarks += tuple(read)
     return replace(_with_unit_of_power(sheet, entries), remarks=(*sheet.remarks, *remarks))
 
 
 def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:
     before = sheet.values.get(key)
-    if before is not None and abs(before.value / value.value - 1.0) > 1e-9:
+    if before is not None and abs(before.value - value.value) > max(
+        1e-9 * value.value, before.half_step + value.half_step if key == "inertia_kg_m2" else 0.0
+    ):
         raise refused(
             f"{KEYS[key][0]} is said twice ({name}): two motors, or 50 and 60 Hz, on one sheet?", f"{before.printed} and {value.printed}",
             "one value of one motor at one frequency", sheet.source,
@@ -169,15 +184,13 @@ def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:
     return replace(sheet, values={**sheet.values, key: value})
 
 
-def _read(entry: Entry, sheet: Sheet, unsaid: list[str]) -> Iterator[tuple[str, Value]]:
+def _read(entry: Entry, sheet: Sheet, unsaid: list[str], remarks: list[str]) -> Iterator[tuple[str, Value]]:
     """The values of one entry, with their keys."""
     if entry.key == "winding_resistance" and (at := _AT.search(f"{entry.name} {entry.printed}")) is not None:
-        yield "winding_temperature_c", value_of("winding_temperature_c", at[1], "°C", entry.name, sheet.source)
+        yield "winding_temperature_c", value_of("winding_temperature_c", at[1], f"°{at[2]}", entry.name, sheet.source)
         entry = replace(entry, name=_AT.sub("", entry.name), printed=_AT.sub("", entry.printed))
-    if entry.key in ("efficiency", "power_factor") and (three := TRIPLE.match(entry.printed)):
-        unit = three[4] or names.unit_of(entry.name)
-        for ending, number in zip(("", "_75", "_50"), three.groups()[:3], strict=True):
-            yield entry.key + ending, value_of(entry.key + ending, number, unit, entry.name, sheet.source)
+    if entry.key in ("efficiency", "power_factor") and (at_loads := _at_loads(entry, sheet.source, remarks)):
+        yield from at_loads
         return
     printed = _of_connection(entry, sheet) if (PAIR.match(entry.printed)) else entry.printed
     found = split_unit(printed)
@@ -186,10 +199,44 @@ def _read(entry: Entry, sheet: Sheet, unsaid: list[str]) -> Iterator[tuple[str, 
     number, unit = found
     unit = unit.partition(";")[0].strip() or entry.unit or names.unit_of(entry.name)
     key = _whole_key(entry, unit, unsaid)
-    if key == "poles":
+    if key == "flywheel_effect":
+        inertia, remark = inertia_of_flywheel(number, unit, entry.name, sheet.source)
+        remarks.append(remark)
+        yield "inertia_kg_m2", inertia
+    elif key == "poles":
         yield "pole_pairs", Value(value_of("pole_pairs", number, "", entry.name, sheet.source).value / 2.0, 0.0, number)
     elif key:
         yield key, value_of(key, number, "" if _says_it_again(key, unit) else unit, entry.name, sheet.source)
+
+
+def _at_loads(entry: Entry, source: str, remarks: list[str]) -> list[tuple[str, Value]]:
+    """The values of several loads in one cell; nothing where it holds one. Of three whose order is not said the power factor tells it:
+    it rises with the load. DataRefused: as many values as loads are not there."""
+    found, loads = AT_LOADS.match(entry.printed), names.loads_in(entry.name)
+    numbers = re.findall(_SHARE, found[1]) if found else []
+    if found is None or (not loads and len(numbers) != len(FALLING)):
+        if loads and split_unit(entry.printed):
+            raise refused(
+                f"{entry.name} names {len(loads)} loads",
+                entry.printed,
+                f"{len(loads)} values, as 0.81/0.75/0.63",
+                source,
+            )
+        return []
+    if loads and len(loads) != len(numbers):
+        raise refused(f"{entry.name} names {len(loads)} loads", entry.printed, f"{len(loads)} values", source)
+    if not loads:
+        shares = [float(number.replace(",", ".")) for number in numbers]
+        is_rising = entry.key == "power_factor" and shares == sorted(shares)
+        loads = FALLING[::-1] if is_rising else FALLING
+        remarks.append(
+            f"{entry.name} {entry.printed}: taken as of {'50, 75 and 100' if is_rising else '100, 75 and 50'} % load"
+        )
+    if None in loads:
+        remarks.append(f"{entry.name} {entry.printed}: values of other loads than 100, 75 and 50 % are not used")
+    unit = found[2] or names.unit_of(entry.name)
+    pairs = [(entry.key + ending, number) for ending, number in zip(loads, numbers, strict=True) if ending is not None]
+    return [(key, value_of(key, number, unit, entry.name, source)) for key, number in pairs]
 
 
 def _says_it_again(key: str, unit: str) -> bool:

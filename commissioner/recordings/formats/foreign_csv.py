@@ -15,6 +15,7 @@ import pyarrow.csv as pa_csv
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
 from commissioner.recordings.formats import workbook
+from commissioner.recordings.formats.kinds import is_text
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import Marks, is_number, marks_of, plain, to_numbers
@@ -22,16 +23,18 @@ from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import (
     Clock,
+    UnitSaid,
     clock_in,
     factors_said,
     metadata_of,
     pairs,
     probes_in,
-    units_in,
+    units_said,
 )
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
 from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
-from commissioner.recordings.table import CONTRACT_COLUMNS
+from commissioner.recordings.sheets.indexed import in_rows
+from commissioner.recordings.sheets.upright import upright
 from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
@@ -52,12 +55,13 @@ class RawTable:
     values: tuple[Signal, ...]
     metadata: dict[str, str]
     clock: Clock
+    units_said: Mapping[str, UnitSaid]
     notes: tuple[ReadingNote, ...]
 
 
 def read_text(path: Path) -> tuple[str, str]:
     """(text with plain numbers, encoding) of a file within its limits; DataRefused where it cannot be unpacked."""
-    if path.suffix.lower() in workbook.ENDINGS:
+    if path.suffix.lower() in workbook.ENDINGS and not is_text(path):
         return plain(workbook.text_of(path)), "UTF-8"
     try:
         data = bounded_text(path, MAX_FOREIGN_BYTES)
@@ -69,6 +73,8 @@ def read_text(path: Path) -> tuple[str, str]:
 
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
+    turned = upright(text)
+    text = text if turned is None else turned
     layout = layout_of(text, source)
     if layout.is_split:
         raise DataRefused(
@@ -87,20 +93,22 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
     notes += factors_said(layout.preface)
     names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
-    units = tuple(unit or _said_once(name, units_in(said)) for name, unit in zip(names, units, strict=True))
-    return RawTable(names, units, tuple(columns), _pointed(metadata_of(said), marks), clock, tuple(notes))
+    if turned is not None:
+        notes.append(
+            ReadingNote(
+                "upright", "quantities stand down the rows: each column of numbers was taken as a point of the test"
+            )
+        )
+    names, units, points, of_tests = in_rows(names, units, columns)
+    notes += of_tests
+    once = units_said(said, (" ; ".join(row) for row in layout.preface))
+    return RawTable(names, units, points, _pointed(metadata_of(said), marks), clock, once, tuple(notes))
 
 
 def _pointed(metadata: Mapping[str, str], marks: Marks) -> dict[str, str]:
     """Numbers above the columns by the decimal mark of the file."""
     is_comma = marks.decimal == ","
     return {k: v.replace(",", ".") if is_comma and re.fullmatch(r"[+-]?\d+,\d+", v) else v for k, v in metadata.items()}
-
-
-def _said_once(name: str, units: Mapping[str, str]) -> str:
-    """The unit that stands once above the columns for all that measure the same; nothing of other columns."""
-    meaning = meaning_of(name) if units and name not in CONTRACT_COLUMNS else None
-    return next((unit for kind, unit in units.items() if meaning and meaning.startswith(kind)), "")
 
 
 def _sample(body: str, layout: Layout) -> list[str]:

@@ -38,6 +38,13 @@ def columns_of(path: Path, file: pa_parquet.ParquetFile) -> tuple[pa.Table, list
             column, notes = pa.chunked_array([values]), [*notes, *more]
         unit = said.get("unit") or said.get("units") or ""
         found[f"{name} [{unit}]" if unit and name == without_brackets(name) else name] = column
+    if nested := [name for name in schema.names if pa.types.is_nested(schema.field(name).type)]:
+        notes.append(
+            ReadingNote(
+                "nested",
+                f"{', '.join(nested)[:120]}: lists or structures in each cell, not used; store a number in each",
+            )
+        )
     return pa.table(found), _without_numbers(schema.names, names, time), tuple(notes)
 
 

@@ -31,6 +31,12 @@ _UNSTORED = re.compile(
     rb"|<table:table-cell\b(?=[^>]*\btable:formula=)(?![^>]*\boffice:value-type=)[^>]*>"
 )
 """A formula without the value that it gave, as programs write it that do not calculate (XLSX, ODS)."""
+_ROW = re.compile(rb"<(?:row|table:table-row)\b[^>]*>.*?</(?:row|table:table-row)>", re.DOTALL)
+_STORED = re.compile(
+    rb'<c\b(?![^>]*\bt="(?:s|str|inlineStr|b|e)")[^>]*>(?:\s*<f\b[^>]*(?:/>|>[^<]*</f>))?\s*<v>[^<]'
+    rb'|<table:table-cell\b[^>]*\boffice:value-type="(?:float|percentage|currency|date|time)"'
+)
+"""A cell with a number (XLSX, ODS)."""
 Cells = Sequence[Sequence[Any]]
 
 
@@ -82,7 +88,8 @@ def _opened(path: Path) -> CalamineWorkbook:
 def _require_bounded(path: Path) -> None:
     """Unpacks to count: what a workbook says of its own size proves nothing, and a wrong size fails its check sum here.
     DataRefused also where a formula has no value."""
-    limit, size, unstored = min(MOST_BYTES, unpacked_limit(path)), 0, 0
+    limit, size = min(MOST_BYTES, unpacked_limit(path)), 0
+    unstored, sampled, holds_numbers = 0, 0, False
     try:
         with zipfile.ZipFile(path) as packed:
             for member in packed.infolist():
@@ -93,14 +100,35 @@ def _require_bounded(path: Path) -> None:
                         if size > limit:
                             raise too_large(path, f"> {limit}", limit)
                         pieces.append(piece)
-                unstored += len(_UNSTORED.findall(b"".join(pieces))) if member.filename.endswith(".xml") else 0
+                if member.filename.endswith(".xml"):
+                    found = _unstored(b"".join(pieces))
+                    unstored, sampled = unstored + found[0], sampled + found[1]
+                    holds_numbers |= found[2]
     except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, NotImplementedError) as error:
         raise _unreadable(path, error) from error
-    if unstored:
+    if sampled or (unstored and not holds_numbers):
         raise _refused(
-            path, "holds formulas whose values were not stored", f"{unstored} cells", "a value in each cell",
+            path, "holds formulas whose values were not stored", f"{unstored} cells, {sampled} of them in the table", "a value in each cell",
             "open it in a spreadsheet program and save it there, which calculates it, or save it as CSV",
         )  # fmt: skip
+
+
+def _unstored(member: bytes) -> tuple[int, int, bool]:
+    """(formulas without a value, how many of them a table needs, whether any page holds rows of numbers). A row that holds no number is a summary where it stands below the
+    numbers, or above them and not next to them, where the names do; without it the rest is whole. A page without numbers is a table of
+    formulas where several rows hold several of them."""
+    count, needed, holds_numbers = 0, 0, False
+    for page in member.split(b"<table:table "):
+        rows = [(len(_UNSTORED.findall(row)), _STORED.search(row) is not None) for row in _ROW.findall(page)]
+        lost = [one[0] for one in rows]
+        numbers = [k for k, (_, holds_number) in enumerate(rows) if holds_number]
+        count += sum(lost)
+        holds_numbers |= len(numbers) >= LEAST_ROWS
+        if len(numbers) >= LEAST_ROWS:
+            needed += sum(lost[max(numbers[0] - 1, 0) : numbers[-1] + 1])
+        elif sum(one >= LEAST_NUMBERS for one in lost) >= LEAST_ROWS:
+            needed += sum(lost)
+    return count, needed, holds_numbers
 
 
 def _is_table(cells: Cells) -> bool:

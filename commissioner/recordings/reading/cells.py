@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -164,13 +165,14 @@ def _cast(text: pa.Array) -> Signal:
 
 def _one_by_one(text: pa.Array, marks: Marks, source: str) -> tuple[Signal, list[str]]:
     values, wrong = np.full(len(text), np.nan), []
-    for k, whole in enumerate(text.to_pylist()):
-        cell = ungrouped((whole or "").strip().strip('"').strip())
+    cells = [ungrouped((whole or "").strip().strip('"').strip()) for whole in text.to_pylist()]
+    clocks = [CLOCK.fullmatch(cell) for cell in cells]
+    is_month_first = _is_month_first([clock for clock in clocks if clock])
+    for k, (cell, clock) in enumerate(zip(cells, clocks, strict=True)):
         if cell.lower() in NOTHING:
             continue
-        clock = CLOCK.fullmatch(cell)
         try:
-            values[k] = clock_seconds(clock) if clock else _number(cell, marks, source)
+            values[k] = clock_seconds(clock, is_month_first) if clock else _number(cell, marks, source)
         except ValueError:
             wrong.append(cell)
     values[~np.isfinite(values)] = np.nan
@@ -191,18 +193,41 @@ def _number(cell: str, marks: Marks, source: str) -> float:
     return float(cell.replace(marks.other, "").replace(marks.decimal, ".").lower().replace("d", "e"))
 
 
-def clock_seconds(found: re.Match[str]) -> float:
-    """Seconds of a time of day, since 1970 where a date stands before it (day before month where the year comes last, but
-    beside AM and PM)."""
-    year, month, day, day2, month2, year2, hours, minutes, seconds, fraction, half = found.groups()
-    days = 0.0
-    if year or year2:
-        date = (int(year), int(month), int(day)) if year else (int(year2) % 100 + 2000, int(month2), int(day2))
-        if date[1] > 12 or (year2 and half and date[2] <= 12):
-            date = (date[0], date[2], date[1])
-        days = float(
-            (np.datetime64(f"{date[0]:04d}-{date[1]:02d}-{date[2]:02d}") - np.datetime64("1970-01-01")).astype(int)
+def _is_month_first(found: Sequence[re.Match[str]]) -> bool:
+    """Of dates whose year comes last: whether the month does first in all of a column. By a number above twelve or AM and PM; else by
+    what lets the recording pass midnight in a day (`02/03`, `02/04`) and not in a month."""
+    dates = {
+        (int(one[4]), int(one[5]), int(one[6]) % 100 + 2000): bool(one[11])
+        for one in found
+        if one[6] and int(one[4]) and int(one[5])
+    }
+    if any(first > 12 or second > 12 for first, second, _ in dates):
+        return not any(first > 12 for first, _, _ in dates)
+    if any(dates.values()):
+        return True
+    spans = [
+        np.ptp(
+            [_days(year, *((first, second) if is_month else (second, first))) for first, second, year in dates] or [0.0]
         )
+        for is_month in (False, True)
+    ]
+    return bool(spans[1] < spans[0])
+
+
+def _days(year: int, month: int, day: int) -> float:
+    """Since 1970. ValueError: there is no such day."""
+    return float((np.datetime64(f"{year:04d}-{month:02d}-{day:02d}") - np.datetime64("1970-01-01")).astype(int))
+
+
+def clock_seconds(found: re.Match[str], is_month_first: bool) -> float:
+    """Seconds of a time of day, since 1970 where a date stands before it."""
+    year, month, day, first, second, year2, hours, minutes, seconds, fraction, half = found.groups()
+    days = 0.0
+    if year:
+        days = _days(int(year), int(month), int(day))
+    elif year2:
+        of_month = (int(first), int(second)) if is_month_first else (int(second), int(first))
+        days = _days(int(year2) % 100 + 2000, *(of_month if of_month[0] <= 12 else of_month[::-1]))
     part = float("0." + fraction[1:]) if fraction else 0.0
     return DAY_S * days + 3600.0 * _hour(hours, half) + 60.0 * int(minutes) + int(seconds) + part
 

@@ -108,9 +108,35 @@ def layout_of(text: str, source: str) -> Layout:
                 continue  # the last row of a table with a spoilt one
             if _are_numbers([row[skip:] for row in rows]) and _go_on(rows[0], lines[k:], separator):
                 return _layout(lines, k, separator, skip, [row[skip:] for row in rows], source)
-    raise DataRefused(
-        f"{source}: no rows of numbers were found", step="read recording", value=lines[0].text[:60] if lines else "",
-        limit="two or more columns of numbers", remedy="export time, three currents and three voltages as CSV",
+    raise _without_rows([line.text for line in lines], source)
+
+
+def empty(source: str) -> DataRefused:
+    """Of a file in which nothing stands."""
+    return DataRefused(
+        f"{source}: the file is empty", step="read recording", value="nothing", limit="names of columns and rows of numbers",
+        remedy="export the recording again, and see that the export ends before the file is copied",
+    )  # fmt: skip
+
+
+def _without_rows(lines: Sequence[str], source: str) -> DataRefused:
+    """Of a text without rows of numbers: it is empty, holds a header and nothing below it, or is no table."""
+    filled = [line.strip("\ufeff \t;,") for line in lines]
+    filled = [line for line in filled if line]
+    if not filled:
+        return empty(source)
+    rows = [_said(line, mark) for line in filled for mark in SEPARATORS if mark in line]
+    header = next((row for row in rows if len(row) > 1 and _known(row) > 1), None)
+    holds_numbers = any(sum(map(is_number, row)) > 1 for row in rows)
+    what = (
+        "the file holds a header and no row of numbers below it"
+        if header and not holds_numbers
+        else "no rows of numbers were found"
+    )
+    return DataRefused(
+        f"{source}: {what}", step="read recording", value=", ".join(header)[:60] if header else filled[0][:60],
+        limit="rows of numbers below the names" if header else "two or more columns of numbers",
+        remedy="record again, or export the samples as well as their names" if header else "export time, three currents and three voltages as CSV",
     )  # fmt: skip
 
 
@@ -180,6 +206,8 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
 def _cells_above(text: str, separator: str, width: int) -> Row:
     """The cells of a line above the numbers; by another separator where that gives one for each column and theirs does not."""
     bare = text.lstrip("\ufeff")
+    if separator == " " and bare.startswith("#") and SIGNS.match(bare.lstrip("# ")):
+        return [bare.lstrip("# ").strip()]  # its spaces separate nothing
     ways = [_said(bare, mark) for mark in dict.fromkeys((separator, ";", "\t", ","))]
     return next((row for row in ways if len(row) == width), ways[0])
 

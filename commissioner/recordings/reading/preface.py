@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from commissioner.recordings.units import read_unit, without_brackets
+from commissioner.recordings.units import measured_by, read_unit, without_brackets
 from commissioner.recordings.words import translated
 from commissioner.records import ReadingNote
 
@@ -133,10 +133,44 @@ def factors_said(preface: Sequence[Sequence[str]]) -> list[ReadingNote]:
     return [ReadingNote("factors", f"{factors} {what}")] if (factors := factors_in(preface)) else []
 
 
-def units_in(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:
-    """The unit of all times, currents or voltages that a preface names once (`Time unit: ms`), by what it measures."""
-    found = [(_UNIT_OF.fullmatch(key(name)), value) for name, value, _ in said]
-    return {_MEASURES[one[1] or one[2]]: value for one, value in reversed(found) if one}
+@dataclass(frozen=True)
+class UnitSaid:
+    """The unit that a line above the columns gives for all that measure the same, and that line."""
+
+    unit: str
+    line: str
+
+
+def units_said(said: Iterable[tuple[str, str, str]], cells: Iterable[str]) -> Mapping[str, UnitSaid]:
+    """The units that stand once above the columns for all times, currents or voltages, by what these are: of keys (`Time unit: ms`),
+    else of lines."""
+    keys = [(_UNIT_OF.fullmatch(key(name)), name, value) for name, value, _ in said]
+    of_keys = {
+        _MEASURES[one[1] or one[2]]: UnitSaid(value, f"{name}: {value}") for one, name, value in reversed(keys) if one
+    }
+    return {**_units_in_lines(cells), **of_keys}
+
+
+def _units_in_lines(cells: Iterable[str]) -> Mapping[str, UnitSaid]:
+    """The units that lines say beside what is measured (`currents in mA`, `Spannungen [kV]`, `current_u_a: mA`), by what they measure;
+    of what is said in two units, or with a value (`rated current in mA: 4860`), nothing."""
+    found: dict[str, list[UnitSaid]] = {}
+    for cell in cells:
+        for one in _IN_UNIT.finditer(" ".join(translated(cell.replace("：", ":")).split())):
+            unit = read_unit(one["unit"])
+            if unit and unit.measures == _measured(one["what"]):
+                found.setdefault(unit.measures, []).append(UnitSaid(one["unit"], cell.strip().lstrip("# ")))
+    return {
+        measures: said[0]
+        for measures, said in found.items()
+        if len({unit.scale for one in said if (unit := read_unit(one.unit))}) == 1
+    }
+
+
+def _measured(word: str) -> str | None:
+    """What a word of prose, or a column of the contract, measures."""
+    kind = _NOUN.search(word.lower())
+    return measured_by(word.lower()) or (kind.lastgroup if kind else None)
 
 
 def _keyed(preface: Sequence[Sequence[str]], names: re.Pattern[str]) -> list[tuple[str, list[str]]]:
@@ -159,4 +193,14 @@ _MEASURES = {"time": "time", "zeit": "time", "temps": "time", "horizontal": "tim
 _UNIT_OF = re.compile(
     rf"({'|'.join(_MEASURES)})(?:axis)?(?:units?|einheit|unitlabel)|unité(?:de)?({'|'.join(_MEASURES)})"
 )
+_NOUN = re.compile(
+    r"(?P<current>(?:currents?|str(?:o|oe|ö)me?|amperages?)$|^i$)|(?P<voltage>(?:voltages?|spannung(?:en)?)$|^[uv]$)"
+    r"|(?P<time>(?:times?|zeit(?:en)?|temps)$|^t$)|(?P<power>(?:powers?|leistung(?:en)?)$|^p$)|(?P<speed>(?:speeds?|drehzahl)$)"
+)
+_IN_UNIT = re.compile(
+    r"(?<!\w)(?P<what>[^\W\d]\w*)(?: (?:units?|einheit|单位|is|are|was|were|given|measured|recorded|stored|values?|samples|all|sind|ist|werte?|angegeben|gemessen|sont))*"
+    r"\s*(?:(?<!\w)(?:in|en)(?!\w)|[:=(\[])\s*\(?\[?(?P<unit>[^\W\d][^\s,;.:()\[\]]*)(?![^\s,;.:)\]])(?![)\]]?\s*[:=;]?\s*[-+]?\d)",
+    re.IGNORECASE,
+)
+"""What is measured, and the text of a unit behind it that no value follows."""
 _RATIO = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?)\s*(?::\s*1|x)?", re.IGNORECASE)

@@ -23,16 +23,19 @@ from commissioner.recordings.names import (
     uses_rst,
 )
 from commissioner.recordings.reading.mapping import Target
+from commissioner.recordings.reading.preface import UnitSaid
 from commissioner.recordings.reading.said_tests import is_title
 from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns, sheet_unit, winding_columns
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
 from commissioner.recordings.units import (
     FOREIGN,
     IN_NAME,
+    MEASURES,
     NO_UNIT,
     is_peak,
     is_rms,
     is_temperature,
+    measured_by,
     read_unit,
     unbracketed,
     unit_in,
@@ -40,10 +43,8 @@ from commissioner.recordings.units import (
 )
 from commissioner.records import ReadingNote, Signal
 
-MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
-            "_deg": "angle", "_nm": "torque"}  # fmt: skip
 SHOWN = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency": "Hz", "resistance": "ohm", "angle": "deg",
-         "torque": "Nm"}  # fmt: skip
+         "torque": "Nm", "speed": "rad/s"}  # fmt: skip
 SAME_TIME = 0.01
 """Of a sample period, by which two columns of one time may differ."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
@@ -61,9 +62,12 @@ class Recognised:
 
 
 def recognise(
-    names: Sequence[str], units: Sequence[str], values: Sequence[Signal], targets: Mapping[str, Target], source: str
-) -> Recognised:
-    """The columns by the contract's names where they mean one, else by their own; see the module."""
+    names: Sequence[str], units: Sequence[str], values: Sequence[Signal], targets: Mapping[str, Target], source: str,
+    said: Mapping[str, UnitSaid],
+) -> Recognised:  # fmt: skip
+    """The columns by the contract's names where they mean one, else by their own; see the module. `said`: units that stand once above
+    the columns."""
+    own, units = units, [unit or _said_once(name, said) for name, unit in zip(names, units, strict=True)]
     names = [f"{n} [{u}]" if is_temperature(u) and not unit_in(n) else n for n, u in zip(names, units, strict=True)]
     meant = in_company(names)
     with_s = uses_rst([n for n in meant.values() if n])
@@ -106,7 +110,47 @@ def recognise(
     if rms:
         notes.append(ReadingNote("rms", f"the unit of {', '.join(rms)} is one of rms values: samples are taken as they are printed; where "
                                  "they were divided by sqrt(2), map the channels with a factor of 1.41421"))  # fmt: skip
+    once = [name for name, before, unit in zip(names, own, units, strict=True) if unit != before]
+    notes += (
+        [ReadingNote("unit_once", f"{', '.join(once)}: in the unit that a line above the columns gives")]
+        if once
+        else []
+    )
+    notes += _units_apart(readings, said, targets, source)
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _said_once(name: str, said: Mapping[str, UnitSaid]) -> str:
+    """The unit that stands once above the columns for all that measure the same; nothing of other columns, or of a name with its own."""
+    meaning = meaning_of(name) if said and name not in CONTRACT_COLUMNS and not unit_of(name) else None
+    line = said.get(measured_by(meaning) or "") if meaning else None
+    return line.unit if line else ""
+
+
+def _units_apart(
+    readings: Sequence[ColumnReading], said: Mapping[str, UnitSaid], targets: Mapping[str, Target], source: str
+) -> list[ReadingNote]:
+    """Notes of columns whose own unit is another than a line above them says. DataRefused: of a column of the contract, whose name is
+    often given to values that nobody has divided."""
+    apart = []
+    for reading in readings:
+        line, target = said.get(measured_by(reading.meaning or "") or ""), targets.get(reading.name)
+        unit = read_unit(line.unit) if line and not (target and target.factor is not None) else None
+        if line and unit and not np.isclose(unit.scale, abs(reading.factor), rtol=1e-9):
+            apart.append((reading, line, unit, reading.unit or SHOWN[unit.measures]))
+    ours = [one for one in apart if one[0].name in CONTRACT_COLUMNS]
+    if ours:
+        reading, line, unit, own = ours[0]
+        factors = " and ".join(f"`# {r.name}: {r.meaning} * {u.scale:g}`" for r, _, u, _ in ours)
+        raise DataRefused(
+            f"{source}: {reading.name} is in {own} by its name and in {line.unit} by the line {line.line[:80]!r}", step="recognise columns",
+            value=f"{reading.name} [{line.unit}]", limit=f"one unit: {own}", remedy="where the line is right, say so by comment lines "
+            f"with a factor, {factors}; where the name is right, take the line out",
+        )  # fmt: skip
+    return [
+        ReadingNote("two_units", f"{reading.name} is in {own}, and the line {line.line[:80]!r} says {line.unit}: {own} was taken")
+        for reading, line, _, own in apart
+    ]  # fmt: skip
 
 
 def _require_one_time(names: Sequence[str], places: tuple[int, int], times: tuple[Signal, Signal], source: str) -> None:
@@ -195,9 +239,7 @@ def _factor(name: str, unit: str, meaning: str, source: str) -> float:
         return 1.0
     if known is None:
         raise _refused(name, unit, meaning, source, "none that is known")
-    expected = next((m for ending, m in MEASURES.items() if meaning.endswith(ending)), None)
-    if meaning == "speed_rad_per_s":
-        expected = "speed"
+    expected = measured_by(meaning)
     if expected is None or (known.measures != expected and name.endswith(f"_{unit}") and known.scale == 1.0):
         return 1.0
     if known.measures != expected:

@@ -60,3 +60,21 @@ def test_the_url_that_ports_prints_opens_that_port(device):
     url = parse_url(url_of(device))
     assert isinstance(url, RtuUrl)
     assert url.path == device
+
+
+def test_a_remark_has_the_signs_of_the_tables_and_a_file_the_ones_it_had():
+    from commissioner.cli.screens.screen import signs
+
+    assert (
+        signs("the currents lie +12.7 +- 0.7 us behind the status")
+        == "the currents lie +12.7 ± 0.7 µs behind the status"
+    )
+
+
+def test_a_configurations_error_says_each_thing_once(capsys):
+    from commissioner.cli.screens.screen import failure
+    from commissioner.errors import ConfigurationError
+
+    failure(ConfigurationError(file="m.toml", key="pole_pairs", value=0, expected="pole pairs: 1 or more"))
+    shown = " ".join(capsys.readouterr().err.split())
+    assert shown.count("1 or more") == 1 and shown.endswith("remedy correct pole_pairs in m.toml")

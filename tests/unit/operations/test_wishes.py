@@ -69,3 +69,16 @@ def test_a_run_without_its_journal_is_damaged_and_not_passed_over(tmp_path: Path
     (verified,) = verify_runs(tmp_path, None)
     assert not verified.is_whole
     assert any("journal.jsonl" in str(loss) for loss in verified.losses)
+
+
+def test_a_played_recording_without_noise_is_said_to_hold_none_and_is_known_by_it(tmp_path: Path) -> None:
+    quiet, noisy = tmp_path / "quiet.csv", tmp_path / "noisy.csv"
+    assert any("--noise-a" in remark for remark in simulate(SimulateRequest("motor_2kw2", quiet, seconds=2.0)).remarks)
+    assert simulate(SimulateRequest("motor_2kw2", noisy, seconds=2.0, noise_a=1e-3)).remarks == ()
+    said = {}
+    for path in (quiet, noisy):
+        done = identify_any(IdentifyRequest((path,), motor="motor_2kw2"))
+        said[path] = done.document["remarks"]  # type: ignore[union-attr]
+    assert any("is not white" in remark for remark in said[quiet])
+    assert any("hold no noise" in remark for remark in said[quiet])
+    assert not any("hold no noise" in remark for remark in said[noisy])

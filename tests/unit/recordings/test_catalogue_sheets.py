@@ -274,3 +274,63 @@ def test_torn_sheets_end_in_an_answer_or_in_one_error(tmp_path, seed):
                 settled(sheet, frozenset())
         except DataRefused as refused:
             assert refused.step and refused.limit and refused.remedy
+
+
+PLAIN = (
+    "P_N: 2.2 kW\nU_N: 400 V\nf_N: 50 Hz\nn_N: 1430 1/min\nI_N: 4.8 A\nM_K/M_N: 2.9\neta: 84.3 %\nconnection: star\n"
+)
+
+
+@pytest.mark.parametrize(
+    "line", ["cos phi 50/75/100 %: 0.63/0.75/0.81", "cos phi: 0.63/0.75/0.81", "cos phi (50/75/100 %): 0,63 / 0,75 / 0,81",
+             "cos phi: 0.81 0.75 0.63", "cos phi 100/75/50: 81/75/63 %", "cos phi 2/4, 3/4, 4/4: 0.63 - 0.75 - 0.81",
+             "cos phi 25/50/75/100 %: 0.40/0.63/0.75/0.81", "Leistungsfaktor 50/75/100 %;0,63;0,75;0,81"],
+)  # fmt: skip
+def test_three_power_factors_of_one_cell_belong_to_their_loads(tmp_path, line):
+    sheet = read(tmp_path, PLAIN + line + "\n")
+    found = [sheet.values[f"power_factor{at}"].value for at in ("", "_75", "_50")]
+    assert found == pytest.approx([0.81, 0.75, 0.63])
+    is_said = "/4" in line or "100" in line
+    assert any("% load" in remark for remark in sheet.remarks) != is_said
+
+
+@pytest.mark.parametrize(
+    "line", ["cos phi 100/75/50: 0.81/0.75", "cos phi 100/75/50 %: 0.81", "eta 100/75 %: 84/84/82"]
+)
+def test_fewer_values_than_loads_are_refused(tmp_path, line):
+    with pytest.raises(DataRefused, match=r"names . loads"):
+        read(tmp_path, PLAIN + line + "\n")
+
+
+@pytest.mark.parametrize(
+    "line", ["GD²: 0.032 kgm²", "GD2: 0.032 kgfm2", "GD2 (kgf m²): 0.032", "Schwungmoment GD²;0,032;kp·m²", "PD2: 320 kg cm2",
+             "Flywheel effect: 0.032 kg m2", "Schwungmoment: 0.032"],
+)  # fmt: skip
+def test_a_flywheel_effect_is_four_times_the_inertia_and_said(tmp_path, line):
+    sheet = read(tmp_path, PLAIN + line + "\n")
+    assert sheet.values["inertia_kg_m2"].value == pytest.approx(0.008)
+    assert any("J = 0.008 kg m2" in remark for remark in sheet.remarks)
+    assert read(tmp_path, PLAIN + line + "\nJ: 0.008 kgm2\n").values["inertia_kg_m2"].value == pytest.approx(0.008)
+    with pytest.raises(DataRefused, match="is said twice"):
+        read(tmp_path, PLAIN + line + "\nJ: 0.032 kgm2\n")
+
+
+def test_pound_feet_squared_are_a_mass_times_a_radius_squared(tmp_path):
+    for name in ("WK2", "Rotor inertia"):
+        sheet = read(tmp_path, PLAIN + f"{name}: 0.19 lb ft²\n")
+        assert sheet.values["inertia_kg_m2"].value == pytest.approx(0.19 * 0.45359237 * 0.3048**2, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "R_UV at 68 °F: 3.1 Ohm",
+        "R_UV: 3.1 Ohm @ 68 °F",
+        "R_UV: 3.1 Ohm\nTemperature: 68 degF",
+        "R_UV: 3.1 Ohm\nTemperature: 293.15 K",
+    ],
+)
+def test_a_temperature_has_its_zero(tmp_path, line):
+    sheet = read(tmp_path, PLAIN + line + "\n")
+    assert sheet.values["winding_temperature_c"].value == pytest.approx(20.0)
+    assert sheet.values["winding_resistance_uv_ohm"].value == pytest.approx(3.1)

@@ -215,7 +215,7 @@ def test_import_says_what_a_sheet_is(tmp_path: Path, head: str, kind: str) -> No
 def test_a_nameplate_in_place_of_a_recording_is_told_where_it_belongs(tmp_path: Path) -> None:
     path = tmp_path / "motor.toml"
     path.write_text("rated_power_w = 2200.0\nrated_voltage_v = 400.0\n")
-    with pytest.raises(DataRefused, match="TOML files are not read") as refused:
+    with pytest.raises(DataRefused, match="this is a TOML file, which is not read") as refused:
         identify_any(IdentifyRequest((path,)))
     assert "--motor" in refused.value.remedy
 

@@ -24,6 +24,12 @@ SHEETS = {
     "À vide;60;208;8,17;420\nRotor bloqué;15;25;27,9;920\n",
     "a meter in every line": "test,f (Hz),V_ab (V),V_bc (V),V_ca (V),I_a (A),I_b (A),I_c (A),W1 (W),W2 (W)\ndc,0,13.6,,,28,,,,\n"
     "no_load,60,208,208,208,8.17,8.17,8.17,1051,-631\nlocked_rotor,15,25,25,25,27.9,27.9,27.9,694,226\n",
+    "transposed": "Quantity,DC,No-load,Locked rotor\nf [Hz],0,60,15\nU [V],13.6,208,25\nI [A],28.0,8.17,27.9\nP [W],380.8,420,920\n",
+    "transposed with units apart": "Prüfer;Müller\nGröße;Einheit;Gleichstrom;Leerlauf;Kurzschluss\nU;V;13,6;208;25\nI;A;28,0;8,17;27,9\n"
+    "P;kW;;0,42;0,92\nf;Hz;0;60;15\n",
+    "lists": "U0 [V];I0 [A];P0 [kW];f0 [Hz];Uk [V];Ik [A];Pk [W];fk [Hz];R_UV [Ohm]\n208;8,17;0,42;60;25;27,9;920;15;0,4857\n",
+    "a list of lines": "U_0: 208 V\nI_0: 8.17 A\nP_0: 420 W\nf_0: 60 Hz\nU_k: 25 V\nI_k: 27.9 A\nP_k: 0.92 kW\nf_k: 15 Hz\nR_UV: 485.7 mOhm\n",
+    "lists between spaces": "# R_UV (mOhm): 485.7\nV0 I0 P0 f0 Vcc Icc Pcc fcc\n208 8.17 420 60 25 27.9 920 15\n",
     "short": "test,voltage_v,current_a,power_kw,frequency_hz,winding_resistance_uv_ohm\nno-load,208,8.17,0.42,60,0.4857\n"
     "locked,25,27.9,0.92,15,0.4857\n",
 }
@@ -39,6 +45,36 @@ def test_a_sheet_gives_its_circuit_under_anybodys_headers(tmp_path: Path, name: 
     found = [q["value"] for q in done.document["parameters"].values()]
     assert found[:4] == pytest.approx([0.2429, 0.1514, 3.484e-3, 35.11e-3], rel=1e-3)
     assert all(q["std"] is None for q in done.document["parameters"].values())
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("U;400\nI;4,8\nP;2200\n", None),  # may be a plate
+        ("t,U0,I0,I1\n0,1,2,3\n1,1,2,3\n2,1,2,3\n", None),
+        ("U0,I0,U1,I1,P0\n1,2,3,4,5\n1,2,3,4,6\n", None),  # phases counted from zero
+        ("U0,I0,P0\n400,2.1,180\n300,1.5,120\n200,1.1,90\n", "U0, I0, P0: the no load test"),
+        ("f;50;50;50\nU;400;300;110\nI;2,1;1,5;5,0\nP;180;120;420\n", "quantities stand down the rows"),
+    ],
+)
+def test_a_list_is_taken_for_tests_where_its_names_are_certain(tmp_path: Path, text: str, says: str | None) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(text, encoding="utf-8")
+    try:
+        table = contract_table(path)
+    except DataRefused:
+        assert says is None
+        return
+    found = [note.what for note in table.notes if note.code in ("upright", "indexed_tests")]
+    assert bool(found) == (says is not None) and (says is None or says in found[0])
+    if says:
+        assert table.columns["voltage_line_v"].size == 3 and table.columns["power_w"].tolist()[0] == 180.0
+
+
+def test_one_frequency_may_stand_above_a_list(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text("# f: 60 Hz\nU0,I0,P0\n208,8.17,420\n180,6,330\n", encoding="utf-8")
+    assert contract_table(path).columns["frequency_hz"].tolist() == [60.0, 60.0]
 
 
 def test_each_test_may_stand_in_a_file_of_its_own(tmp_path: Path) -> None:

@@ -140,3 +140,80 @@ def test_units_in_words():
         1e3,
         1e-9,
     ]
+
+
+OURS = "time_s,current_u_a,current_v_a,voltage_uv_v,voltage_vw_v"
+LINES = ["currents in mA", "all currents are in milliamperes, voltages in V", "Ströme in mA", "currents [mA]", "unit of current: mA",
+         "Current unit: mA", "current: mA", "current_u_a in mA", "Les courants sont en mA", "corrientes: mA", "I in mA", "电流单位：mA"]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_that_contradicts_a_name_of_ours_is_refused_with_both(tmp_path, line):
+    path = written(tmp_path / "x.csv", [f"# {line}", OURS], TIME, 1e3)
+    with pytest.raises(DataRefused, match="current_u_a is in A by its name and in m") as refused:
+        contract_table(path)
+    said = [part.strip("` ") for part in refused.value.remedy.split("`") if part.startswith("# ")]
+    assert len(said) == 2
+    columns = contract_table(written(path, [f"# {line}", *said, OURS], TIME, 1e3)).columns
+    np.testing.assert_allclose(columns["current_v_a"], 3 * TWO, atol=1e-6)
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_gives_the_unit_of_names_without_one(tmp_path, line):
+    table = contract_table(written(tmp_path / "x.csv", [f"# {line}", "t,ia,ib,uab,ubc"], TIME, 1e3))
+    np.testing.assert_allclose(table.columns["current_u_a"], 3 * ONE, atol=1e-6)
+    assert [note.what for note in table.notes if note.code == "unit_once"]
+    other = contract_table(written(tmp_path / "x.csv", [f"# {line}", "t,Ia [A],Ib [A],uab,ubc"], TIME))
+    np.testing.assert_allclose(other.columns["current_u_a"], 3 * ONE, atol=1e-6)
+    assert [note.what[:12] for note in other.notes if note.code == "two_units"] == ["Ia [A] is in", "Ib [A] is in"]
+
+
+@pytest.mark.parametrize(
+    "line", ["currents in A, voltages in V", "rated current in mA: 4860", "no-load current [mA] 850", "trigger: current in phase u",
+             "time in s", "currents in mA and currents in kA", "voltages of the supply in kiel", "Nennstrom (mA); 4860"],
+)  # fmt: skip
+def test_a_line_that_agrees_or_says_a_value_is_nothing_to_ask_about(tmp_path, line):
+    for names in (OURS, NAMED):
+        table = contract_table(written(tmp_path / "x.csv", [f"# {line}", names], TIME))
+        np.testing.assert_allclose(table.columns["current_u_a"], 3 * ONE, atol=1e-6)
+        assert not [note for note in table.notes if note.code in ("two_units", "unit_once") and "mA" in note.what]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("", "the file is empty"), ("\n \n", "the file is empty"), ("\ufeff", "the file is empty"),
+     (OURS + "\n", "holds a header and no row of numbers"), ("Zeit;Ia;Ib\ns;A;A\n", "holds a header and no row of numbers"),
+     ("# rated_power_w: 2200\n" + OURS, "holds a header and no row of numbers"), ("f [Hz];U [V];I [A];P [W]\n", "holds a header and no row"),
+     ("Dear colleague,\nplease find attached\n", "no rows of numbers were found")],
+)  # fmt: skip
+def test_a_file_without_rows_says_why(tmp_path, text, says):
+    (tmp_path / "x.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(DataRefused, match=says):
+        contract_table(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("02/03/2026 23:59:59", "02/04/2026 00:00:00"), ("01/12/2026 23:59:59", "01/13/2026 00:00:00"), ("03.02.2026 23:59:59", "04.02.2026 00:00:00"),
+     ("12/31/2025 23:59:59", "01/01/2026 00:00:00"), ("31/01/2026 23:59:59", "01/02/2026 00:00:00"), ("01/31/26 11:59:59 PM", "02/01/26 12:00:00 AM"),
+     ("04/05/2026 10:00:00", "04/05/2026 10:00:01")],
+)  # fmt: skip
+def test_a_date_that_passes_midnight_has_its_day_where_one_second_passes(tmp_path, first, second):
+    def stamps(k):
+        date, clock, *half = (first if k < 20 else second).split(" ")
+        return " ".join([date, f"{clock}.{(k % 20) * 50:03d}", *half])
+
+    path = written(tmp_path / "x.csv", ["time,ia,ib,uab,ubc"], [stamps(k) for k in range(TIME.size)])
+    np.testing.assert_allclose(np.diff(contract_table(path).columns["time_s"]), 0.05, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("unit", "printed", "celsius"), [("°F", 212.0, 100.0), ("degF", 32.0, 0.0), ("K", 293.15, 20.0), ("°C", 40.0, 40.0)]
+)
+def test_a_temperature_is_known_with_its_zero_and_is_no_time(tmp_path, unit, printed, celsius):
+    known = read_unit(unit)
+    assert known.measures == "temperature" and known.scale * printed + known.offset == pytest.approx(celsius)
+    columns = contract_table(
+        written(tmp_path / "x.csv", ["# sample_period_s: 0.0002", f"T [{unit}],ia,ib,uab,ubc"], 20 + TIME)
+    ).columns
+    assert columns["time_s"][1] == pytest.approx(2e-4)

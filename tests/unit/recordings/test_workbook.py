@@ -95,3 +95,93 @@ def test_a_workbook_that_unpacks_to_more_than_memory_is_refused(tmp_path: Path) 
     with pytest.raises(DataRefused) as refused:
         contract_table(path)
     assert ">" in str(refused.value.value)
+
+
+@pytest.mark.parametrize("above", [False, True])
+def test_a_summary_of_formulas_without_values_is_left_out_and_the_rest_read(tmp_path: Path, above: bool) -> None:
+    mean = [["Mean", "=AVERAGE(B3:B4)", "=AVERAGE(C3:C4)", "=AVERAGE(D3:D4)", ""]]
+    rows = [*mean, *TESTS] if above else [*TESTS, *mean]
+    path = workbook(tmp_path / "x.xlsx", Tests=rows, Chart=[["Peak", "=MAX(Tests!B2:B3)"]])
+    assert contract_table(path).columns["voltage_line_v"].tolist()[:2] == [208.0, 25.0]
+
+
+@pytest.mark.parametrize(
+    "rows", [[TESTS[0], ["No load", "=200+8", 8.17, 0.42, 60], TESTS[2]], [["Test", "=B9", "I (A)", "P (kW)", "f (Hz)"], *TESTS[1:]],
+             [TESTS[0], ["No load", "=200+8", "=8", "=1", "=60"], ["Locked", "=1", "=2", "=3", "=4"]], [["P_N [kW]", "U_N [V]"], ["=11", "=400"]]],
+)  # fmt: skip
+def test_a_table_of_formulas_without_values_is_refused(tmp_path: Path, rows: list[list[object]]) -> None:
+    with pytest.raises(DataRefused, match="holds formulas whose values were not stored"):
+        contract_table(workbook(tmp_path / "x.xlsx", Tests=rows))
+
+
+ODS = (
+    '<office:document-content xmlns:office="urn:oasis:names:tc:opendocument:xmlns:office:1.0" xmlns:table="urn:oasis:names:tc:opendocument:'
+    'xmlns:table:1.0" xmlns:text="urn:oasis:names:tc:opendocument:xmlns:text:1.0" office:version="1.2"><office:body><office:spreadsheet>'
+    '<table:table table:name="S1">{}</table:table></office:spreadsheet></office:body></office:document-content>'
+)
+
+
+def opendocument(path: Path, rows: list[list[object]]) -> Path:
+    def cell(value: object) -> str:
+        if isinstance(value, str) and value.startswith("="):
+            return f'<table:table-cell table:formula="of:{value}"/>'
+        kind = (
+            f'office:value-type="float" office:value="{value}"'
+            if not isinstance(value, str)
+            else 'office:value-type="string"'
+        )
+        return f"<table:table-cell {kind}><text:p>{value}</text:p></table:table-cell>"
+
+    body = "".join(f"<table:table-row>{''.join(map(cell, row))}</table:table-row>" for row in rows)
+    with zipfile.ZipFile(path, "w") as packed:
+        packed.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        packed.writestr("content.xml", '<?xml version="1.0" encoding="UTF-8"?>' + ODS.format(body))
+        packed.writestr(
+            "META-INF/manifest.xml",
+            '<manifest:manifest xmlns:manifest="urn:oasis:names:tc:opendocument:xmlns:manifest:1.0"/>',
+        )
+    return path
+
+
+def test_an_opendocument_is_read_and_one_of_formulas_refused(tmp_path: Path) -> None:
+    path = opendocument(tmp_path / "x.ods", [*TESTS, ["Mean", "=AVERAGE([.B2:.B3])", "", "", ""]])
+    assert contract_table(path).columns["voltage_line_v"].tolist()[:2] == [208.0, 25.0]
+    with pytest.raises(DataRefused, match="formulas whose values were not stored"):
+        contract_table(opendocument(tmp_path / "y.ods", [TESTS[0], TESTS[1], ["Locked", 25, "=27.9", 0.92, 60]]))
+
+
+CSV = "time_s,current_u_a,current_v_a,voltage_u_v,voltage_v_v\n" + "".join(f"{k / 1000},1,2,3,{k}\n" for k in range(40))
+
+
+@pytest.mark.parametrize(
+    ("name", "says", "remedy"),
+    [("a.zip", "a ZIP archive", "unpack it"), ("a.csv", "a ZIP archive", "unpack it"), ("a.numbers", "Apple Numbers", "Export To"),
+     ("a.docx", "a text document", "CSV"), ("a.fods", "a flat OpenDocument", "XLSX"), ("a.npz", "arrays of NumPy", "CSV")],
+)  # fmt: skip
+def test_what_is_packed_is_named_and_never_read_as_a_text(tmp_path: Path, name: str, says: str, remedy: str) -> None:
+    with zipfile.ZipFile(tmp_path / name, "w") as packed:
+        packed.writestr("recording.csv", CSV)  # not compressed: its rows stand there as text
+    with pytest.raises(DataRefused, match=says) as refused:
+        contract_table(tmp_path / name)
+    assert remedy in refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "says"),
+    [("a.pdf", b"%PDF-1.4\n1,2\n3,4\n", "a PDF document"), ("a.csv", b"\x89PNG\r\n\x1a\n", "a picture"), ("a.dat2", b"\x93NUMPY\x01\x00", "NumPy"),
+     ("a.xls", b"<html><table>", "an HTML page"), ("a.txt", b"\x1f\x8b\x08", "packed by gzip"), ("a.csv", b"PAR1\x15", "a Parquet file"),
+     ("a.json", b"{}", "a JSON file"), ("a.xml", b"<?xml version='1.0'?>", "an XML file"), ("a.feather", b"ARROW1\0\0", "Feather")],
+)  # fmt: skip
+def test_a_file_is_known_by_its_first_bytes(tmp_path: Path, name: str, begin: bytes, says: str) -> None:
+    (tmp_path / name).write_bytes(begin + CSV.encode())
+    with pytest.raises(DataRefused, match=says):
+        contract_table(tmp_path / name)
+
+
+def test_a_workbook_of_another_name_is_asked_for_its_own_and_a_text_called_one_is_read(tmp_path: Path) -> None:
+    workbook(tmp_path / "x.xlsx", Tests=TESTS).rename(tmp_path / "x.csv")
+    with pytest.raises(DataRefused, match="a workbook by what it holds") as refused:
+        contract_table(tmp_path / "x.csv")
+    assert ".xlsx" in refused.value.remedy
+    (tmp_path / "lab.xls").write_text(CSV.replace(",", "\t"), encoding="utf-8")
+    assert contract_table(tmp_path / "lab.xls").columns["voltage_v_v"][-1] == 39.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from commissioner.cli.verbs.archived.deciding import restore_run
-from commissioner.errors import DataRefused, IdentityMismatch, UsageError, WriteBackFailed
+from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError, WriteBackFailed
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.records import SampleBlock
@@ -72,6 +72,21 @@ def test_what_the_run_wrote_is_taken_back(bench):
     bench.write()
     assert {row.name for row in bench.restore().written} == set(PARAMETERS)
     assert bench.held() == bench.snapshot.in_use
+
+
+@pytest.mark.parametrize(("kind", "is_gone"), [("SIM-2K2", True), ("ACS880", False)])
+def test_a_demos_drive_is_said_to_be_gone_with_it(bench, monkeypatch, kind, is_gone):
+    def silent(*_, **__):
+        raise LinkUnreachable("no connection", step="connect", remedy="check the cable")
+
+    identity = replace(bench.snapshot.identity, drive_type=kind)
+    snapshot = replace(bench.snapshot, identity=identity)
+    monkeypatch.setattr(restoring, "_complete", lambda *_: snapshot)
+    monkeypatch.setattr(restoring, "open_port", silent)
+    with pytest.raises(LinkUnreachable) as caught:
+        bench.restore()
+    assert ("ends with the demo" in caught.value.remedy) == is_gone
+    assert ("cable" in caught.value.remedy) != is_gone
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,72 @@
+"""Lists of a no-load and a locked-rotor test, told by the index of their symbols (`U0 I0 P0`, `U_k;I_k;P_k`), as rows that name their test."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from commissioner.recordings.units import IN_NAME, read_unit, unit_in
+from commissioner.records import IDLE_TEST, LOCKED_TEST, ReadingNote, Signal
+
+_SYMBOL = re.compile(r"([UVEIPWf])[_ ]?\{?(?:(0|nl|o)|(k|cc|sc|lr|br|bl|cto))\}?", re.IGNORECASE)
+_KIND = {"u": "U", "v": "U", "e": "U", "i": "I", "p": "P", "w": "P", "f": "f"}
+MEASURES = {"U": "voltage", "I": "current", "P": "power", "f": "frequency"}
+SHOWN = {"U": "V", "I": "A", "P": "W", "f": "Hz"}
+CALLED = {IDLE_TEST: "no load", LOCKED_TEST: "locked rotor"}
+
+
+def tests_in(names: Sequence[str]) -> Mapping[float, Mapping[str, int]]:
+    """Of each test whose volts, amperes and watts are all there, once: the place of each symbol's name. None where other names count on
+    (`I0`, `I1`): then they are phases."""
+    found: dict[float, dict[str, int]] = {}
+    bare = [IN_NAME.sub("", name).strip() for name in names]
+    if any(re.fullmatch(r"[UVEI][_ ]?1", name, re.IGNORECASE) for name in bare):
+        return {}
+    for k, name in enumerate(bare):
+        if (one := _SYMBOL.fullmatch(name)) is None:
+            continue
+        of_test = found.setdefault(IDLE_TEST if one[2] else LOCKED_TEST, {})
+        kind = _KIND[one[1].lower()]
+        if kind in of_test:
+            return {}
+        of_test[kind] = k
+    return {test: of for test, of in found.items() if {"U", "I", "P"} <= of.keys()}
+
+
+def in_rows(
+    names: Sequence[str], units: Sequence[str], values: Sequence[Signal]
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[Signal, ...], list[ReadingNote]]:
+    """The columns with a row for each point of each test, its test named; as they are where no names tell tests."""
+    tests = tests_in(names)
+    if not tests or any(_factor(k, kind, names, units) is None for of in tests.values() for kind, k in of.items()):
+        return tuple(names), tuple(units), tuple(values), []
+    taken = {k for of in tests.values() for k in of.values()}
+    others = [k for k in range(len(names)) if k not in taken]
+    kinds = [kind for kind in SHOWN if any(kind in of for of in tests.values())]
+    parts: list[list[Signal]] = []
+    for test, of in tests.items():
+        own = [_in_si(of.get(kind), kind, names, units, values) for kind in kinds]
+        rows = np.isfinite(own).any(axis=0)
+        parts.append([column[rows] for column in (np.full(rows.size, test), *own, *(values[k] for k in others))])
+    columns = tuple(np.concatenate(part) for part in zip(*parts, strict=True))
+    said = [f"{', '.join(names[k] for k in of.values())}: the {CALLED[test]} test" for test, of in tests.items()]
+    note = ReadingNote("indexed_tests", "; ".join(said) + "; each of its points was taken as a row")
+    called = ("test", *kinds, *(names[k] for k in others))
+    return called, ("", *(SHOWN[kind] for kind in kinds), *(units[k] for k in others)), columns, [note]
+
+
+def _factor(k: int, kind: str, names: Sequence[str], units: Sequence[str]) -> float | None:
+    """To SI; None of a unit that is not one of this quantity, which is refused by its name."""
+    text = units[k] or unit_in(names[k])
+    unit = read_unit(text) if text else None
+    if not text:
+        return 1.0
+    return unit.scale if unit and unit.measures == MEASURES[kind] and not unit.is_ambiguous else None
+
+
+def _in_si(k: int | None, kind: str, names: Sequence[str], units: Sequence[str], values: Sequence[Signal]) -> Signal:
+    if k is None:
+        return np.full(values[0].size, np.nan)
+    return values[k] * (_factor(k, kind, names, units) or 1.0)

@@ -1,0 +1,99 @@
+"""A test sheet whose quantities stand down the rows and whose points stand beside each other, turned upright."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from commissioner.recordings.reading.cells import is_number
+from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.reading.said_tests import codes
+from commissioner.recordings.sheet_names import is_sheet, sheet_columns
+from commissioner.recordings.sheets.indexed import tests_in
+from commissioner.recordings.units import FOREIGN, read_unit, unit_in
+
+MOST_BYTES, MOST_LINES = 20_000, 80
+MARKS = (";", "\t", ",", ":", "=")
+_CELL = re.compile(r"([-+]?[\d.,' ]*\d(?:[eE][-+]?\d+)?)\s*(\D*)")
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A quantity: its name, its unit, its value at each point."""
+
+    name: str
+    unit: str
+    values: tuple[str, ...]
+
+
+def upright(text: str) -> str | None:
+    """The text with a row for each point; None where it is no such sheet. A list of one point is one only where its names say which
+    test it is (`U0`, `Uk`): bare names (`U`, `I`, `P`) may be a plate's."""
+    if len(text) > MOST_BYTES:
+        return None
+    lines = [line.text.strip().lstrip("\ufeff") for line in head_lines(text) if line.text.strip()]
+    if not 3 <= len(lines) <= MOST_LINES:
+        return None
+    return next((found for mark in MARKS if (found := _turned(lines, mark))), None)
+
+
+def _turned(lines: Sequence[str], mark: str) -> str | None:
+    said = [line for line in lines if line.startswith("#")]
+    rows = [_cells(line, mark) for line in lines if not line.startswith("#")]
+    if any(is_sheet(row) or len(tests_in(row)) > 0 for row in rows):
+        return None
+    quantities = [one for row in rows if (one := _quantity(row))]
+    names = [one.name for one in quantities]
+    points = max((len(one.values) for one in quantities), default=0)
+    is_certain = len(tests_in(names)) > 0 or (points > 1 and is_sheet(names))
+    if not is_certain or any(len(one.values) != points for one in quantities):
+        return None
+    titles = next((title for row in rows if (title := _titles(row, points))), ())
+    head = [f"{one.name} [{one.unit}]" if one.unit and not unit_in(one.name) else one.name for one in quantities]
+    columns = [one.values for one in quantities]
+    if titles:
+        head, columns = ["test", *head], [titles, *columns]
+    between = mark if mark in ";\t" else "\t"
+    body = [between.join(cells) for cells in (head, *zip(*columns, strict=True))]
+    others = [f"# {row[0]}: {' '.join(row[1:])}" for row in rows if _is_beside(row, points)]
+    return "\n".join([*said, *others, *body]) + "\n"
+
+
+def _cells(line: str, mark: str) -> list[str]:
+    cells = split(line, mark) if mark in ";\t," else [cell.strip() for cell in line.split(mark, 1)]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _quantity(row: Sequence[str]) -> _Line | None:
+    """A row of a name, of its unit where that has a cell of its own, and of numbers, with their unit or without."""
+    if len(row) < 2 or not row[0] or is_number(row[0]):
+        return None
+    has_unit = len(row) > 2 and bool(row[1]) and not is_number(row[1]) and _is_unit(row[1])
+    found = [_CELL.fullmatch(cell) if cell else None for cell in row[2 if has_unit else 1 :]]
+    if not any(found) or any(
+        cell and one is None for cell, one in zip(row[2 if has_unit else 1 :], found, strict=True)
+    ):
+        return None
+    behind = {one[2].strip() for one in found if one}
+    if len(behind) > 1 or not (behind == {""} or (not has_unit and all(map(_is_unit, behind)))):
+        return None
+    unit = row[1].strip("[]() ") if has_unit else behind.pop()
+    return _Line(row[0], unit, tuple(one[1].strip() if one else "" for one in found))
+
+
+def _is_unit(text: str) -> bool:
+    return read_unit(text) is not None or text.strip("[]() ").lower() in FOREIGN | {"-", "", "1"}
+
+
+def _titles(row: Sequence[str], points: int) -> tuple[str, ...]:
+    """What the points are called, where a row names their tests."""
+    cells = tuple(row[-points:]) if len(row) > points else ()
+    return cells if cells and not any(map(is_number, cells)) and codes(cells) is not None else ()
+
+
+def _is_beside(row: Sequence[str], points: int) -> bool:
+    """A key with its value that is no quantity of the points."""
+    return len(row) > 1 and _quantity(row) is None and not _titles(row, points) and not sheet_columns(row[:1])
