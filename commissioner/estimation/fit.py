@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.cancelling import ask_for_time
 from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES, SHAPES
@@ -169,10 +170,11 @@ def problem_of(record: Record, held_out: float = 0.3) -> Problem:
 
 
 def simulate(problem: Problem, machine: Machine) -> list[tuple[Array, Array]]:
-    """Current (n, 3) and shaft (n, 2: electrical speed, torque) of each window."""
+    """Current (n, 3) and shaft (n, 2: electrical speed, torque) of each window. TimeOver: given up."""
     out = []
     p, scales = machine.physical(), problem.record.scales.as_tuple()
     for k, w in enumerate(problem.record.windows):
+        ask_for_time()
         run, shaft = np.empty((w.count, 3)), np.empty((w.count, 2))
         x = machine.first[k].copy()
         march(
@@ -217,9 +219,10 @@ def held_part(problem: Problem, parts: Sequence[Array]) -> Array:
 
 
 def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> Array:
-    """Whitened sensitivities of the simulated current, (columns, fitted samples x channels), cut as the residuals are."""
+    """Whitened sensitivities of the simulated current, (columns, fitted samples x channels), cut as the residuals are. TimeOver: given up."""
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
+        ask_for_time()
         run = np.zeros((len(columns), u, 3))
         own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind == "x" and c.window == k)]
         by_load = [j for j, c in enumerate(columns) if c.kind == "k" and c.window == k]
