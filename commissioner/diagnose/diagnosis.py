@@ -17,7 +17,6 @@ from commissioner.diagnose.fit.answerable import check_before_search, check_one_
 from commissioner.diagnose.fit.gauss_newton import Fit
 from commissioner.diagnose.fit.spread import covariance_of
 from commissioner.diagnose.intake.audit import Audit, prepare
-from commissioner.diagnose.intake.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
 from commissioner.diagnose.intake.refusal import refused
@@ -35,6 +34,7 @@ from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
 from commissioner.diagnose.verdict.experiment import next_experiment
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
 from commissioner.errors import DataRefused
+from commissioner.estimation.cancelling import TimeOver, given_up_by
 from commissioner.identify.estimate.sufficiency import WORST_RELATIVE_STD
 from commissioner.motor.circuit import PARAMETERS, SYMBOLS, Quantity
 from commissioner.records import DiagnosisVerdict, StandstillRecording

@@ -58,7 +58,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
         "excitation": _excitation(seen),
         "audit": [],
         "remarks": list(seen.remarks),
-        "is_complete": found.is_complete if found else True,
+        "is_complete": seen.is_complete,
         "next_experiment": None if seen.next_experiment is None else {
             "do": seen.next_experiment.do, "steps": list(seen.next_experiment.steps), "splits": list(seen.next_experiment.splits),
             "repeats": seen.next_experiment.repeats, "command": seen.next_experiment.command,

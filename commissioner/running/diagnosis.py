@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.cancelling import TimeOver
 from commissioner.estimation.fit import Fit, problem_of
 from commissioner.estimation.numbers import AT, FOUR, NAMES
 from commissioner.estimation.record import Record, prepare
@@ -61,7 +62,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything the report shows. `found` is None where the data were refused."""
+    """Everything the report shows. `found` is None where the data were refused, or the time was over before four numbers were fitted."""
 
     verdict: DiagnosisVerdict
     reason: str
@@ -80,10 +81,16 @@ class Diagnosis:
         """Of the final machine, by name; empty where the data were refused."""
         return self.found.fit.machine.values() if self.found else {}
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether every cause was tried and weighed. What was refused is not tried again with more time."""
+        return self.found.is_complete if self.found else self.refusal is not None
+
 
 UNFINISHED: tuple[DiagnosisVerdict, str] = (
     "unexplained", "Not finished: the time allowed was over before every cause was tried and weighed.",
 )  # fmt: skip
+NO_LIMIT = "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
 
 
 def diagnose(
@@ -97,7 +104,7 @@ def diagnose(
     """Names what a four-parameter simulation gets wrong about recordings of one running motor.
 
     Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason. `go_on` is asked before
-    every refit; once it says no, the search is given up: the answer says so, and names nothing.
+    every simulation of a window; once it says no, fit and search are given up: the answer says so, and names nothing.
     """
     try:
         record = prepare(recordings, plate)
@@ -109,6 +116,8 @@ def diagnose(
         )
     except DataRefused as refusal:
         return Diagnosis("refused", f"{refusal.what}; {refusal.remedy}", refusal=refusal)
+    except TimeOver:
+        return Diagnosis(*UNFINISHED, record=record, remarks=(*record.remarks, NO_LIMIT))
     return _conclude(record, found)
 
 
@@ -125,9 +134,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         verdict, reason = _verdict(causes, left, gain)
     remarks += _left_open(found) if causes else ()
     if not found.is_complete:
-        remarks.append(
-            "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
-        )
+        remarks.append(NO_LIMIT)
         if seen := ", ".join(so_far(found.steps)):
             remarks.append(f"Seen on the way, and not yet weighed against others: {seen.replace('_', ' ')}.")
     if not record.has_start:

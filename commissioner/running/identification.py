@@ -83,12 +83,12 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     columns, shift = fit.columns, 0.0
     if record.has_speed and record.has_start:
         columns = (*columns, SPEED_LAG)
-        fit = refine(problem, fit.machine, columns, most=20, is_final=False)
+        fit = refine(problem, fit.machine, columns, is_final=False)
         shift = fit.machine.value("speed_lag")
         problem = _earlier(problem, shift)
         record = problem.record
     start = fit.machine.with_values({"speed_lag": fit.machine.value("speed_lag") - shift})
-    of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns, most=20)
+    of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns)
     by_lag = fit.machine.theta[: len(FOUR)] - of_slope if shift else np.zeros(len(FOUR))
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
@@ -177,11 +177,13 @@ def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
 
 
 def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | None, dict[str, float]]:
-    """Inertia and load of a start: from the fit where the shaft is in it, else from torque against measured speed."""
+    """Inertia and load of a start: from the fit where the shaft is in it, else from torque against measured speed. Without a start the
+    inertia alone, where a load that moves tells it."""
     record = problem.record
     torque = record.scales.torque_nm
     if not record.has_start:
-        return None, {}
+        told = INERTIA in fit.columns
+        return (Quantity(fit.machine.value("inertia"), fit.std("inertia")) if told else None), {}
     if fit.machine.has_shaft:
         load = {
             "constant_nm": fit.machine.value("load_constant") * torque,
@@ -279,7 +281,11 @@ def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | Non
         out.append(
             f"The inertia is not given: friction, linear and fan load leave more than {100 * MOST_LEFT_OF_SPEED:g} % of synchronous speed of this run-up, or leave the inertia open. Record a run-up with one steady load."
         )
-    if not record.has_start:
+    if not record.has_start and inertia is not None:
+        out.append(
+            "No start: the inertia is what a load that moves shows of it, and R_s is the least certain of the four."
+        )
+    if not record.has_start and inertia is None:
         out.append("No start: the inertia is not in these data, and R_s is the least certain of the four.")
     return tuple(out)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.estimation.cancelling import TimeOver, given_up_by
 from commissioner.estimation.fit import (
     Column,
     Fit,
@@ -54,10 +55,7 @@ class Step:
 
 
 WORSE = "what was held out gets worse"
-
-
-class TimeOver(Exception):
-    """`go_on` said no: what was accepted by then was not weighed against what looks alike."""
+BEYOND = "its size is one that physics does not allow"
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,6 @@ class Search:
     base: Fit
     excluded: frozenset[str]
     observe: Callable[[Step], None]
-    go_on: Callable[[], bool]
     steps: list[Step] = field(default_factory=list)
 
     def say(self, step: Step) -> None:
@@ -143,9 +140,7 @@ class Search:
 
     def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
         """With these causes free; `near` is a fit near by, whose sensitivities serve as long as they do. `first`: Jacobian for the first
-        step, without spare numbers then. TimeOver where the time is."""
-        if not self.go_on():
-            raise TimeOver
+        step, without spare numbers then."""
         if first is not None:
             own = [Column("p", AT[n]) for c in causes[-1:] for n in c.form.numbers]
             before = self.columns(causes[:-1])
@@ -171,8 +166,12 @@ class Search:
 
     def is_plausible(self, fit: Fit, causes: Iterable[Named]) -> bool:
         """Whether every cause has a size that physics allows."""
-        values = dict(zip(NAMES, fit.machine.physical(), strict=True))
-        return all(CATALOGUE[c.cause].is_plausible(values, self.problem.record.scales) for c in causes)
+        return not self.beyond(fit, causes)
+
+    def beyond(self, fit: Fit, causes: Iterable[Named]) -> tuple[Named, ...]:
+        """Those whose size is one that physics does not allow."""
+        values, scales = fit.machine.values(), self.problem.record.scales
+        return tuple(c for c in causes if not CATALOGUE[c.cause].is_plausible(values, scales))
 
 
 def search(
@@ -182,36 +181,37 @@ def search(
     observe: Callable[[Step], None] = lambda _: None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Found:
-    """Names what the four-parameter machine gets wrong. DataRefused where not even that one can be fitted."""
-    problem, base = nominal(problem)
-    seeking = Search(problem, base, frozenset(excluded), observe, go_on)
+    """Names what the four-parameter machine gets wrong. DataRefused where not even that one can be fitted, TimeOver where `go_on` said
+    no before it was: later the plain machine is what is left."""
+    with given_up_by(go_on):
+        problem, base = nominal(problem)
+    seeking = Search(problem, base, frozenset(excluded), observe)
     try:
-        return _found(seeking)
+        with given_up_by(go_on):
+            return _found(seeking)
     except TimeOver:
         plain = unbiased(seeking.problem, seeking.base)
         return Found(seeking.problem, plain, plain, (), {}, {}, {}, tuple(seeking.steps), is_complete=False)
 
 
 def _found(seeking: Search) -> Found:
-    problem, fit = seeking.problem, seeking.base
+    fit = seeking.base
     accepted: tuple[Named, ...] = ()
     for round_ in range(RULES.most_causes):
         taken = _forward(seeking, fit, accepted)
         if taken is None:
             break
         fit, accepted = taken
-        if round_ == 0:  # weights of a machine that is nearly right
-            seeking.problem = with_noise_of(problem, fit.machine)
-            seeking.base = refine(seeking.problem, seeking.base.machine, seeking.base.columns)
-            fit = refine(seeking.problem, fit.machine, fit.columns)
+        if round_ == 0:
+            fit, accepted = _weighted(seeking, fit, accepted)
         fit, accepted = _exchanged(seeking, fit, accepted)
     fit, accepted = _backward(seeking, fit, accepted)
+    shown, fit, accepted = _shown(seeking, fit, accepted)
     gain, rivals = _judged(seeking, fit, accepted)
-    plain = unbiased(seeking.problem, seeking.base)
     return Found(
         seeking.problem,
-        plain,
-        unbiased(seeking.problem, fit) if accepted else plain,
+        unbiased(seeking.problem, seeking.base),
+        shown,
         accepted,
         gain,
         rivals,
@@ -219,6 +219,37 @@ def _found(seeking: Search) -> Found:
         tuple(seeking.steps),
         is_complete=True,
     )
+
+
+def _weighted(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]]:
+    """Both fits with the weights of a machine that is nearly right. Causes that have no size in physics by these are not taken: the next
+    round tries anew, from nothing."""
+    seeking.problem = with_noise_of(seeking.problem, fit.machine)
+    seeking.base = refine(seeking.problem, seeking.base.machine, seeking.base.columns)
+    fit = refine(seeking.problem, fit.machine, fit.columns)
+    if seeking.is_plausible(fit, accepted):
+        return fit, accepted
+    for one in accepted:
+        seeking.say(Step("dropped", one.cause, one.form.name, (seeking.base.chi2 - fit.chi2) / fit.scale, BEYOND))
+    return seeking.base, ()
+
+
+def _shown(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, Fit, tuple[Named, ...]]:
+    """The fit less what the noise of the input does to it, with the fit and the causes that it stands for.
+
+    A cause whose whole size that noise makes (nothing, or less, is left) is none. Where only a limit of another kind is passed nothing
+    is taken off: what is shown has sizes that physics allows.
+    """
+    shown = unbiased(seeking.problem, fit)
+    beyond = seeking.beyond(shown, accepted)
+    values, scales = shown.machine.values(), seeking.problem.record.scales
+    for one in (c for c in beyond if CATALOGUE[c.cause].is_less_than_nothing(values, scales)):
+        others = tuple(c for c in accepted if c != one)
+        less = _less(seeking, fit, accepted, accepted.index(one))
+        if seeking.is_plausible(less, others):
+            seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale, BEYOND))
+            return _shown(seeking, refreshed(seeking.problem, less), others)
+    return (fit if beyond else shown), fit, accepted
 
 
 def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[float, Named, Array]]:
@@ -313,7 +344,7 @@ def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[
     if np.sqrt(gain / fit.count) < least_strength(seeking.problem.record):
         return "too small to matter"
     if not seeking.is_plausible(other, causes):
-        return "its size is one that physics does not allow"
+        return BEYOND
     worse = other.held - held.held
     if worse / max(held.held / max(held.held_count, 1), 1.0) > RULES.hold_out_loss + 0.01 * gain:
         return WORSE
@@ -336,7 +367,8 @@ def _backward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[F
     for one in accepted if len(accepted) > 1 else ():
         others = tuple(c for c in accepted if c != one)
         less = seeking.fitted(_without(fit.machine, one), others, fit)
-        if (less.chi2 - fit.chi2) / fit.scale < _needed(seeking, one):
+        # without one that only bent a law, another may end where physics has no such size: the two stand together then
+        if (less.chi2 - fit.chi2) / fit.scale < _needed(seeking, one) and seeking.is_plausible(less, others):
             seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale))
             return _backward(seeking, refreshed(seeking.problem, less), others)
     return fit, accepted

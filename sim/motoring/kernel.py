@@ -86,13 +86,15 @@ def slope(m, s, course, t, x, out, seen):
     gap = m[SLOT] * math.cos(m[SLOTS] * x[9]) + m[BEND] * math.cos(x[9])
     main = (1.0 + excess + gap) / m[L_S]
     ia, ib = main * x[0] - ia_r, main * x[1] - ib_r
-    # a shorted loop on one phase takes its own current from the terminals' magnetising side
-    turn = 2.0 * math.pi / 3.0 * m[LOOP_PHASE]
-    ct, nt = math.cos(turn), math.sin(turn)
-    ia, ib = ia + x[12] * ct, ib + x[12] * nt
     # iron beside the magnetising inductance: its voltage is d psi_s / dt
     r_s = m[R_S] * (1.0 + m[HEAT_S] * x[10])
     ia, ib = (ia + m[IRON] * va) / (1.0 + m[IRON] * r_s), (ib + m[IRON] * vb) / (1.0 + m[IRON] * r_s)
+    # shorted turns of one phase: the terminals feed what they take, the winding's magnetomotive force and its resistance's
+    # drop are those of what is left (Tallam, Habetler, Harley 2002)
+    turn = 2.0 * math.pi / 3.0 * m[LOOP_PHASE]
+    ct, nt = math.cos(turn), math.sin(turn)
+    wound_a, wound_b = ia, ib
+    ia, ib = ia + x[12] * ct, ib + x[12] * nt
     ua, ub = va, vb
     if m[LINE] != 0.0:
         at = 2.0 * math.pi / 3.0 * m[LINE_PHASE]
@@ -103,8 +105,9 @@ def slope(m, s, course, t, x, out, seen):
             at = 2.0 * math.pi / 3.0 * j
             lost = 2.0 / 3.0 * m[DEAD] * math.tanh((ia * math.cos(at) + ib * math.sin(at)) / m[DEAD_KNEE])
             ua, ub = ua - lost * math.cos(at), ub - lost * math.sin(at)
-    ea, eb = ua - r_s * ia, ub - r_s * ib
+    ea, eb = ua - r_s * wound_a, ub - r_s * wound_b
     out[0], out[1] = ea, eb
+    ea, eb = ea + r_s * ia, eb + r_s * ib
     out[12] = (m[LOOP] * (ea * ct + eb * nt) - x[12]) / m[LOOP_TAU]
     # rotor in its own coordinates: bars with two sections, an asymmetry, heat
     xr, yr = c * ia_r + n * ib_r, -n * ia_r + c * ib_r

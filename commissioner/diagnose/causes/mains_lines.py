@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from commissioner.diagnose.intake.audit import excited_lines
-from commissioner.diagnose.intake.cancelling import ask_for_time
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import TO_PHASES, Named, Record, Segment, each_segment
 from commissioner.diagnose.plant.model import Layout, Model, impedance
 from commissioner.diagnose.plant.prediction import predict
+from commissioner.estimation.cancelling import ask_for_time
 
 Array = NDArray[np.float64]
 HARMONICS = {"mains": (3, 5, 7), "ripple": (2,)}

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from commissioner.diagnose.intake.cancelling import ask_for_time
 from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.spline import cells_of
@@ -24,6 +23,7 @@ from commissioner.diagnose.kernels.trajectory import (
 from commissioner.diagnose.plant.initial_state import initial_state, slopes_of_start
 from commissioner.diagnose.plant.model import Layout, Model, Term
 from commissioner.diagnose.plant.terminals import sense
+from commissioner.estimation.cancelling import ask_for_time
 
 Array = NDArray[np.float64]
 

@@ -179,17 +179,26 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 ga, gb = ga * grown, gb * grown
                 ia, ib = ia + to_stator * ga, ib + to_stator * gb
                 ra, rb = ra + to_rotor * ga, rb + to_rotor * gb
+            # shorted turns lie in the winding: R_s takes (i_k - mu i_f), which is the machine's own current without what the terminals
+            # take for them (Tallam, Habetler, Harley, IEEE Trans. Ind. Appl. 38(4), 2002)
+            shorted_a, shorted_b = one, one
             if has_loop:
                 for j in range(len(LOOP_A)):
                     ca, cb = LOOP_A[j], LOOP_B[j]
                     one_loop = p[LOOP + 2 * j] * (ua * ca + ub * cb) + p[LOOP + 2 * j + 1] * w_n * (
                         y[0] * ca + y[1] * cb
                     )
-                    ia, ib = ia + loop_scale * one_loop * ca, ib + loop_scale * one_loop * cb
+                    shorted_a, shorted_b = (
+                        shorted_a + loop_scale * one_loop * ca,
+                        shorted_b + loop_scale * one_loop * cb,
+                    )
             r_s = p[R_S] * (1.0 + p[HEAT_S] * y[6])
             if iron != 0.0:
                 shrink = 1.0 / (1.0 + iron * r_s)
                 ia, ib = (ia + iron * ua) * shrink, (ib + iron * ub) * shrink
+            own_a, own_b = ia, ib
+            if has_loop:
+                ia, ib = ia + shorted_a, ib + shorted_b
             if has_line:
                 da = p[R_S] * (p[LINE] * ia + p[LINE + 1] * ib)
                 db = p[R_S] * (p[LINE + 1] * ia - p[LINE] * ib)
@@ -206,7 +215,7 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 shaft[q, 0] = w
                 shaft[q, 1] = 1.5 * pairs * (y[3] * ra - y[2] * rb)
             # slopes
-            k[stage, 0], k[stage, 1] = ua - r_s * ia, ub - r_s * ib
+            k[stage, 0], k[stage, 1] = ua - r_s * own_a, ub - r_s * own_b
             r_r = p[R_R] * (1.0 + p[HEAT_R] * y[7])
             fa, fb = r_r * ra, r_r * rb
             if has_bar:

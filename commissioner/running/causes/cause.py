@@ -65,9 +65,17 @@ class Cause:
     allows: Callable[[Values], bool] = field(default=lambda _: True)
     common: Callable[[Values], float] = field(default=lambda _: 0.0)
 
+    def size(self, values: Values, scales: Scales) -> float:
+        """The one that is spoken of."""
+        return next(iter(self.sizes(values, scales).values()))[0]
+
+    def is_less_than_nothing(self, values: Values, scales: Scales) -> bool:
+        """Whether physics gives the first size one sign, and it has the other."""
+        return self.range[0] == 0.0 > self.size(values, scales)
+
     def is_plausible(self, values: Values, scales: Scales) -> bool:
         """Whether the first size lies in the range physics allows."""
-        size = next(iter(self.sizes(values, scales).values()))[0]
+        size = self.size(values, scales)
         return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values))
 
 

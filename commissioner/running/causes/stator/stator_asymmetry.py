@@ -51,9 +51,11 @@ CAUSE = Cause(
     says="One phase of the stator takes {size} of rated current beside its own, in proportion to the voltage: as shorted turns do",
     meaning="A fault of the motor: shorted turns heat where they are and grow.",
     remedy="Stop the motor soon and measure the winding; do not start it again before.",
-    physics="i += (g u_k + b w psi_sk) n_k: a loop of resistance and leakage on winding k (of a delta: between two lines), driven by its flux",
+    physics="i += (g u_k + b w psi_sk) n_k: turns of winding k (of a delta: between two lines) shorted by a resistance and a leakage; "
+    "the winding's own resistance and magnetomotive force see i less that",
     signature="a negative-sequence current in proportion to the voltage that the voltage's own unbalance does not explain",
-    source="Patel, Chandorkar (locus of the negative sequence against load); Radecki, DOI 10.5277/PED160111",
+    source="Tallam, Habetler, Harley, IEEE Trans. Ind. Appl. 38(4), 2002; Patel, Chandorkar (locus of the negative sequence against load); Radecki, "
+    "DOI 10.5277/PED160111",
     forms=tuple(_form(connection, p) for connection, windings in WINDINGS.items() for p in windings),
     sizes=_sizes,
     range=(0.0, 2.0),

@@ -8,10 +8,10 @@ from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.document import as_document
 from commissioner.diagnose.fit.gauss_newton import fit
-from commissioner.diagnose.intake.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.search.journal import Accepted, Screened
+from commissioner.estimation.cancelling import TimeOver, given_up_by
 from tests.unit.diagnose.conftest import NOMINAL, WHITE, recording
 
 

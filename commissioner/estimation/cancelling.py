@@ -1,4 +1,4 @@
-"""Giving a diagnosis up in its midst: whoever asked for it says when, and is heeded within one segment's prediction."""
+"""Giving a fit up in its midst: whoever asked for it says when, and is heeded within one segment's prediction, or one window's simulation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class TimeOver(Exception):
 
 @contextmanager
 def given_up_by(go_on: Callable[[], bool]) -> Iterator[None]:
-    """What is computed inside asks `go_on` before every segment, in whichever thread, and raises TimeOver once it says no."""
+    """What is computed inside asks `go_on` before every segment or window, in whichever thread, and raises TimeOver once it says no."""
     token = _GO_ON.set(go_on)
     try:
         yield
