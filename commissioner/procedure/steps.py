@@ -135,8 +135,8 @@ class Findings:
         said += [(s.stator_resistance.value, s.stator_resistance.std) for s in self.staircases[-1:]]
         if look is not None:
             said.append((look.parameters.stator_resistance_ohm, look.std[0]))
-        weights = [1.0 / std_ohm**2 for _, std_ohm in said]
-        mean_ohm = sum(w * value_ohm for w, (value_ohm, _) in zip(weights, said, strict=True)) / sum(weights)
+        weighed = [(value_ohm, 1.0 / std_ohm**2) for value_ohm, std_ohm in said if std_ohm > 0.0]
+        mean_ohm = sum(value_ohm * weight for value_ohm, weight in weighed) / sum(weight for _, weight in weighed)
         return min(max(mean_ohm, box.lower.stator_resistance_ohm), box.upper.stator_resistance_ohm)
 
 

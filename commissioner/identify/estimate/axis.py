@@ -22,7 +22,6 @@ from commissioner.identify.intake.alignment import more_periods
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
 from commissioner.identify.inverter.leg_law import LegLaw
-from commissioner.identify.inverter.leg_pair import PairLaw
 from commissioner.identify.inverter.staircase import InverterError, Staircase, dc_levels, fit_staircase
 from commissioner.identify.observer.offline import excited_part, observe
 from commissioner.motor.circuit import InverseGamma
@@ -93,11 +92,16 @@ def fit_axis(
     """Batch fit of one test; `like` is an earlier axis' whose model and values it begins with, where its own staircase is
     only looked at if they do not do."""
     fit = _begun_like(like, stretches, period_s) if like is not None else None
-    stairs, law = None, like.batch.model.leg if like is not None else None
-    if fit is None or (like is not None and fit.batch.noise_a > POORER * like.batch.noise_a):
+    law, stairs = _free_law(like), None
+    if fit is None or like is None or fit.batch.noise_a > POORER * like.batch.noise_a:
         stairs = _staircase(stretches)
-        anew = _fitted(stretches, stairs, plate, period_s, guess, leg or (stairs.inverter if stairs else None), law)
-        fit = min((f for f in (fit, anew) if f is not None), key=lambda f: f.batch.criterion())
+        try:
+            anew = _fitted(stretches, stairs, plate, period_s, guess, leg or (stairs.inverter if stairs else None), law)
+        except DataRefused:
+            if fit is None:
+                raise
+        else:
+            fit = anew if fit is None else min(fit, anew, key=lambda f: f.batch.criterion())
     if more_periods(fit.batch.delay, period_s):
         return fit  # on the wrong rows nothing else of it counts
     try:
@@ -118,14 +122,19 @@ def _fitted(
     period_s: float,
     guess: InverseGamma | None,
     first_leg: InverterError | None,
-    law: LegLaw | PairLaw | None,
+    law: LegLaw | None,
 ) -> AxisFit:
     chosen = list(stretches)
     starts = _starts(chosen, plate, period_s, guess, first_leg)
-    known = law if isinstance(law, LegLaw) else None
-    fit = select_model(segments(chosen), period_s, starts, first_leg, known)
+    fit = select_model(segments(chosen), period_s, starts, first_leg, law)
     chosen, fit = _better_with_link(chosen, period_s, fit)
     return AxisFit(tuple(chosen), stairs, fit, chosen[0] is not stretches[0], tuple(stretches))
+
+
+def _free_law(like: AxisFit | None) -> LegLaw | None:
+    """The knots of the earlier axis' leg curve."""
+    law = like.batch.model.leg if like is not None else None
+    return law if isinstance(law, LegLaw) else None
 
 
 def _begun_like(like: AxisFit, stretches: Sequence[Stretch], period_s: float) -> AxisFit | None:

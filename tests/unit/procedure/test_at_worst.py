@@ -71,3 +71,9 @@ def test_look_staircase_and_plate_count_by_their_standard_errors():
     stair = SimpleNamespace(stator_resistance=Quantity(value_ohm, std_ohm))
     seen_ohm = Findings(look=look, staircases=[stair]).resistance_ohm(job)
     assert seen_ohm == pytest.approx((1.0 + 0.4 + 0.4) / 3.0 * typical_ohm)
+
+
+def test_a_look_without_a_standard_error_says_nothing_of_the_resistance():
+    job = _job()
+    look = SimpleNamespace(parameters=FOUND, std=(float("nan"), 0.0, 0.0, 0.0))
+    assert Findings(look=look).resistance_ohm(job) == pytest.approx(prior(job.nameplate).typical.stator_resistance_ohm)
