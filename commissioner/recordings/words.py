@@ -5,6 +5,10 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable
+from functools import lru_cache
+
+MOST_KEPT = 4096
+"""Names whose translation is kept: a table's head is read in many ways."""
 
 TRANSLATED = {
     "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
@@ -75,6 +79,7 @@ def folded(text: str) -> str:
     )
 
 
+@lru_cache(MOST_KEPT)
 def translated(name: str) -> str:
     """The name with words of other languages replaced by those that are looked for; any other name as it is."""
     plain = folded(name).replace("\u2019", "'")

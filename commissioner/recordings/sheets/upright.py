@@ -41,13 +41,13 @@ def upright(text: str) -> str | None:
 def _turned(lines: Sequence[str], mark: str) -> str | None:
     said = [line for line in lines if line.startswith("#")]
     rows = [_cells(line, mark) for line in lines if not line.startswith("#")]
-    if any(is_sheet(row) or len(tests_in(row)) > 0 for row in rows):
-        return None
     quantities = [one for row in rows if (one := _quantity(row))]
     names = [one.name for one in quantities]
     points = max((len(one.values) for one in quantities), default=0)
     is_certain = len(tests_in(names)) > 0 or (points > 1 and is_sheet(names))
     if not is_certain or any(len(one.values) != points for one in quantities):
+        return None
+    if any(is_sheet(row) or len(tests_in(row)) > 0 for row in rows):
         return None
     titles = next((title for row in rows if (title := _titles(row, points))), ())
     head = [f"{one.name} [{one.unit}]" if one.unit and not unit_in(one.name) else one.name for one in quantities]
