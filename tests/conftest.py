@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,6 @@ TESTS = Path(__file__).parent
 REALTIME = (
     "campaigns/test_short_campaigns.py",
     "campaigns/hostile_run",
-    "campaigns/tunings",
     "conformance/test_conformance.py",
     "integration/service",
     "integration/link",
@@ -59,6 +59,8 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
+PATIENT = ("integration/link/test_tune_verb.py", "integration/service/browser/test_tuning.py")
+"""Files of these that wait for a drive which tunes itself, seconds long: no clock judges them either."""
 TOGETHER = "integration/service"
 """Its files share a costly fixture of a whole session: a file's tests stay on one worker."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
@@ -82,6 +84,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if asked & {"realtime", "alone"} and is_none else None
 
 
+@cache
 def _is_in(names: tuple[str, ...], path: Path) -> bool:
     return any(path.is_relative_to(TESTS / name) for name in names)
 
@@ -97,7 +100,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.nodeid in at_night:
             item.add_marker(pytest.mark.campaign)
-        if _is_in(REALTIME, item.path) and item.name.split("[")[0] not in NOT_REALTIME:
+        is_patient = item.name.split("[")[0] in NOT_REALTIME or _is_in(PATIENT, item.path)
+        if _is_in(REALTIME, item.path) and not is_patient:
             item.add_marker(pytest.mark.realtime)
             if _is_in(ALONE, item.path):
                 item.add_marker(pytest.mark.alone)

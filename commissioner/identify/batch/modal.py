@@ -101,12 +101,12 @@ def modal_pass(
             m1, m2 = g1 * u1 + c1 * q1, g2 * u2 + c2 * q2
             rows[0, k], rows[1, k], rows[2, k], rows[3, k], rows[5, k], rows[6, k] = d1, d2, u1, u2, q1, q2
             error[k] = y[begin + k] - m1 - m2 - offset
+            residual[begin + k] = error[k]
             flux[begin + k] = f1 * m1 + f2 * m2
             d1, d2 = p1 * d1 + m1, p2 * d2 + m2
             v = u[begin + k]
             u1, u2 = p1 * u1 + v, p2 * u2 + v
             q1, q2 = p1 * q1, p2 * q2
-        residual[begin : begin + size] = error[:size]
         if root_weight.size:
             rows[4, :size] = 1.0
             for k in range(size):

@@ -429,5 +429,6 @@ def add_scores(rows: Array, weight: Array, residual: Array, score: Array, block:
     for first in range(0, residual.size, block):
         last = min(first + block, residual.size)
         added = np.dot(missed[first:last], rows[first:last])
-        score += added
-        block_scores[first // block] += added
+        for j in range(score.size):  # of two arrays at once two seconds more to compile
+            score[j] += added[j]
+            block_scores[first // block, j] += added[j]

@@ -142,7 +142,7 @@ def test_unknown_inertia_gives_no_load_torque() -> None:
 
 
 def test_leaks_are_seen_monotonically_and_the_smallest_five_sigma_away() -> None:
-    table = leak_table(4, 20.0)
+    table = leak_table(4, 10.0)
     means = [table[leak].mean() for leak in LEAKS_MM2]
     assert means == sorted(means)
     healthy, smallest = table[0.0], table[LEAKS_MM2[1]]
