@@ -6,6 +6,7 @@ import re
 import unicodedata
 
 from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS
+from commissioner.recordings.catalogue.cells import UNITS, unit_key
 from commissioner.recordings.units import unbracketed, unit_in
 from commissioner.recordings.words import readings, translated
 
@@ -30,7 +31,8 @@ NAMES = {
     "breakdown_torque": rf"(?:(?:breakdown|pullout|maximum|max|kipp)(?:torque|moment|drehmoment)|[mtc](?:k|max|b|m)|bdt){_OVER}",
     "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mt](?:s|u|pu)|c(?:u|pu)){_OVER}",
     "no_load_current_a": r"(?:noload|idle|leerlauf)(?:current|strom)|i0",
-    "inertia_kg_m2": r"(?:rotor|mass|massen)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)|momentofinertiaj|j|jm|jmot|jrotor|j?gd2/4|(?:rotor)?w[kr]2",
+    "inertia_kg_m2": r"(?:rotor|mass|massen|motor)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)(?:jm?)?(?:gd2/4)?"
+    r"|j(?:m|mot|rotor)?(?:gd2/4)?|gd2/4|(?:rotor)?w[kr]2",
     "flywheel_effect": r"(?:rotor)?(?:(?:schwungmoment|flywheel(?:effect|moment))(?:[gp]d2)?|[gp]d2)",
     "winding_resistance": r"(?:winding|stator|stander|phase|wicklungs|strang|klemmen|terminal|line(?:toline)?)?(?:resistance|widerstand)\w*|r(?:uv|1|s|ph)\w*",
     "winding_temperature_c": r"(?:at|bei|reference|bezugs|mess|winding|resistance|wicklungs)?temperatu?re?|temperatur",
@@ -61,6 +63,12 @@ def loads_in(name: str) -> tuple[str | None, ...]:
     return tuple(_ENDINGS.get(load) for load in re.findall(_LOAD_SAID, found[0])) if found else ()
 
 
+def load_of(text: str) -> str | None:
+    """The ending of the keys at the load that stands above a column (`75 %`, `3/4 load`): nothing for the whole; None of any other text."""
+    found = re.fullmatch(rf"({_LOAD_SAID})\s*%?", re.sub(r"load|last|charge|carga|carico", "", text.lower()).strip("[]() "))
+    return _ENDINGS.get(found[1]) if found else None
+
+
 def key_of(name: str) -> str | None:
     """The key of `KEYS` that a name means (`starting_current` and its like without ratio or unit; winding_resistance, poles, connection
     and design_class beside them), or None."""
@@ -75,7 +83,7 @@ def key_of(name: str) -> str | None:
 def _before_symbol(name: str) -> str | None:
     """The key of words that a symbol of the same follows (`Kippmoment M_K/M_N`). A symbol's letters abbreviate the sheet's own language
     (`Coppia di spunto Cs/Cn`): of another than English and German the words decide."""
-    words, _, symbol = name.strip().rpartition(" ")
+    words, _, symbol = re.sub(r"cos\s+(?=\S)", "cos", name.strip()).rpartition(" ")
     key = _in_any_order(words)
     is_abroad = key in ABSOLUTE and words != translated(words) and _OF_RATED.fullmatch(symbol) is not None
     return key if is_abroad or key == _matched(symbol) else None
@@ -106,6 +114,8 @@ SAID_WHOLE = {f"{kind}_{load}": f"{kind}_{load}" for kind in ("efficiency", "pow
 def unit_of(name: str) -> str:
     """The unit in a name: in brackets, after a slash that divides by none of the rated values, or as its last letters (`_kw`)."""
     name = _LOADS.sub("", name)
+    if after := _behind_comma(name):
+        return after
     if (ending := _SUFFIX.search(name.strip())) is not None:
         return {"pct": "%", "percent": "%", "kg_m2": "kgm2"}.get(ending[1].lower(), ending[1])
     if (bare := re.search(r"[\[(]\s*([^\])]*)[\])]\s*$", name)) is not None:
@@ -139,9 +149,17 @@ def _is_load(text: str) -> bool:
 
 
 def _without_unit(name: str) -> str:
-    """Without a unit in brackets at the end; a load in brackets stays."""
+    """Without a unit in brackets or behind a comma at the end; a load in brackets stays."""
+    if _behind_comma(name):
+        return name.rpartition(",")[0]
     found = re.search(r"[\[(]\s*([^\])]*)[\])]\s*$", name)
     return name[: found.start()] if found is not None and not _is_load(found[1]) else name
+
+
+def _behind_comma(name: str) -> str:
+    """The unit behind the comma that ends a name (`Rated power, kW`), or nothing."""
+    _, _, last = name.rpartition(",")
+    return last.strip() if "," in name and unit_key(last) not in ("", "-") and unit_key(last) in UNITS else ""
 
 
 def _letters(name: str) -> str:

@@ -17,6 +17,7 @@ from commissioner.motor.nameplate import connection_of
 from commissioner.recordings.catalogue import names
 from commissioner.recordings.catalogue.cells import (
     MEASURES,
+    UNITS,
     inertia_of_flywheel,
     refused,
     split_unit,
@@ -29,6 +30,7 @@ from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import split
 from commissioner.recordings.sheet_names import is_sheet
+from commissioner.recordings.sheets.listed import Listed, listed
 
 ENDINGS = (".csv", ".txt", ".tsv", *workbook.ENDINGS)
 LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 3
@@ -46,6 +48,8 @@ PAIR = re.compile(
     r"^\s*(\d+(?:[.,]\d+)?)(?:\s*[A-Za-zΔ△]+)*\s*/\s*(\d+(?:[.,]\d+)?)[\s;]*([A-Za-z]{0,3}?)\s*(?:[DYΔ△](?:\s*/\s*[DYΔ△])?)?\s*$"
 )
 """`230/400 V`, `400/690 V D/Y`, `400 V D / 690 V Y`."""
+_SAID_BESIDE = re.compile(r"\s*\([^()]*=[^()]*\)$")
+"""Another value behind a unit: `(GD² = 0.176)`."""
 _SHARE = r"\d+(?:[.,]\d+)?"
 AT_LOADS = re.compile(rf"^\s*({_SHARE}(?:\s*%?(?:\s*[;/|–-]\s*|\s+){_SHARE}){{1,4}})\s*(%?)[\s;]*$")
 """Values at several loads in one cell."""
@@ -79,7 +83,7 @@ def sheet_in(path: Path) -> Sheet | None:
     lines = [line.strip().lstrip("\ufeff") for line in text.replace("\r", "\n").split("\n") if line.strip()]
     if len(lines) > MOST_LINES or _is_table_of_samples(lines):
         return None
-    entries = list(_table(lines, str(path)) or _lines(lines))
+    entries = _columned(lines, str(path)) or list(_table(lines, str(path)) or _lines(lines))
     return _sheet(entries, str(path)) if _are_enough({e.key for e in entries}) else None
 
 
@@ -104,7 +108,8 @@ def _is_table_of_samples(lines: Sequence[str]) -> bool:
     if len(numbers) > 2 and alike and not any(sum(names.key_of(c) is not None for c in row) >= FEWEST for row in rows):
         return True
     return any(
-        (is_sheet(row) and not _is_of_a_type(row)) or any(meaning_of(c) == "time_s" for c in row if len(row) > 2)
+        (is_sheet(row) and not _is_of_a_type(row))
+        or (len(row) > 2 and not any(map(is_number, row)) and any(meaning_of(c) == "time_s" for c in row))
         for row in rows
     )
 
@@ -112,6 +117,46 @@ def _is_table_of_samples(lines: Sequence[str]) -> bool:
 def _is_of_a_type(cells: Sequence[str]) -> bool:
     """Whether names tell what no test sheet does: two of how the motor starts, breaks down, and uses its power."""
     return len({key for key in _keys(cells) if key.startswith(("starting_", "breakdown_", "efficiency"))}) > 1
+
+
+def _columned(lines: Sequence[str], source: str) -> list[Entry]:
+    """The values of a list with columns for them; nothing of another form, or of one with fewer values than make a sheet."""
+    found: list[Entry] = []
+    for one in listed(lines, _is_unit):
+        unit = "" if _WITHOUT.fullmatch(one.unit) else one.unit.strip("[]()")
+        if not one.values:
+            found += _lines(one.names)
+        elif (key := _key_in(one.names, unit)) is not None:
+            found += _in_columns(key, one, unit, source)
+    return found if _are_enough({entry.key for entry in found}) else []
+
+
+def _key_in(called: Sequence[str], unit: str) -> str | None:
+    """The key that the words mean; where they mean none, that of a symbol which is more than a letter and has this unit (`Weight;m` is no
+    torque, `Losses;P` no output)."""
+    words, *symbols = sorted(called, key=len, reverse=True)
+    if (key := names.key_of(words)) is not None or not symbols:
+        return key
+    meant = next((key for name in symbols if len(name) > 1 and (key := names.key_of(name))), None)
+    return meant if meant and (meant not in KEYS or unit_key(unit) in MEASURES.get(KEYS[meant][1], set()) | {""}) else None
+
+
+def _in_columns(key: str, one: Listed, unit: str, source: str) -> list[Entry]:
+    """The values of one quantity: one, or one for each load that stands above them. DataRefused: several motors."""
+    name = " ".join(one.names)
+    loads = [names.load_of(above) for above in one.above]
+    if len(one.values) > 1 and None in loads and len(set(one.values)) > 1:
+        raise refused(
+            f"{len(one.values)} values of {name} stand beside each other", ", ".join(one.values)[:80],
+            "one value of one motor at one frequency, or loads above the columns (100 %, 75 %, 50 %)", source,
+        )  # fmt: skip
+    at = {load or "": value for load, value in zip(loads, one.values, strict=False)} or {"": one.values[0]}
+    at_loads = at if key in ("efficiency", "power_factor") else {"": at.get("", "")}
+    return [Entry(key + load, name, value, unit) for load, value in at_loads.items() if value]
+
+
+def _is_unit(text: str) -> bool:
+    return unit_key(text) in UNITS or _WITHOUT.fullmatch(text) is not None
 
 
 def _table(lines: Sequence[str], source: str) -> list[Entry]:
@@ -138,8 +183,11 @@ def _table(lines: Sequence[str], source: str) -> list[Entry]:
     return above + found
 
 
+_WITHOUT = re.compile(r"[-–—/.]|1|pu|p\.u\.|none|n/a", re.IGNORECASE)
+"""What a column of units holds for a value without one."""
 _LINE = (
     re.compile(r"^([^;\t]+?)\s*[;\t]\s*(.+)$"),
+    re.compile(r"^([^;\t]+?)\s*[:=]\s*(?=[-+~≈]?\s*[.,]?\d)(?!\d[/\d]*[;\t:=])(.+)$"),
     re.compile(r"^([^:=]+?)\s*[:=]\s*(.+)$"),
     re.compile(r"^([^,]+?)\s*,\s*(.+)$"),
 )
@@ -197,7 +245,7 @@ def _read(entry: Entry, sheet: Sheet, unsaid: list[str], remarks: list[str]) -> 
     if found is None:
         return
     number, unit = found
-    unit = unit.partition(";")[0].strip() or entry.unit or names.unit_of(entry.name)
+    unit = _SAID_BESIDE.sub("", unit.partition(";")[0]).strip() or entry.unit or names.unit_of(entry.name)
     key = _whole_key(entry, unit, unsaid)
     if key == "flywheel_effect":
         inertia, remark = inertia_of_flywheel(number, unit, entry.name, sheet.source)
