@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 
 from commissioner.recordings.names import ALPHABETS, PHASES, is_remark, key_of, meanings_of
 from commissioner.recordings.units import IN_NAME, unit_in
-from commissioner.recordings.words import readings
+from commissioner.recordings.words import readings, translated
 from commissioner.records import WATT_METERS, WINDINGS
 
 _VOLTS = r"(?:v|u|e|voltage|volts?|spannung|tension)"
@@ -60,6 +60,9 @@ SHEET_RESISTANCE = {
 }
 """Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
 _TERMINALS = re.compile(rf"{_OF_WINDING}(?:between)?(?:terminals)?l?([abcuvwrst123])l?([abcuvwrst123])")
+_BETWEEN = frozenset(f"winding_resistance_{pair}_ohm" for pair in ("uv", "vw", "wu"))
+_SYMBOL_BEHIND = re.compile(r"(.*(?:resistance|widerstand))[\s,(]+(R[ _-]?[A-Za-z0-9-]{0,5})\)?", re.IGNORECASE)
+"""A symbol behind words of the same: `Stator resistance Rs`, `Winding resistance R_UV`."""
 _WINDING = re.compile(rf"{_OF_WINDING}(?:(?:of)?(?:phase|winding|strang)l?([123uvwabcrst])|l([123])|([uvwabcrst]))")
 """One of the three windings, by its phase; a bare number (`R1`) may be a measurement's, or the stator's beside the rotor's."""
 _OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
@@ -90,7 +93,8 @@ def sheet_columns(names: Iterable[str]) -> dict[str, str]:
     several = {m[:7] for m in meters.values() if len({other for other in meters.values() if other[:7] == m[:7]}) > 1}
     own = {n: c for n in names if (c := sheet_meaning(n)) and (n in SHEET or meters.get(n, "")[:7] not in several)}
     own |= _watt_meters(names) | windings
-    return own | {n: c for n in names if n not in own and (c := resistance_meaning(n))}
+    with_s = any(resistance_meaning(n) in _BETWEEN for n in names if n not in own)
+    return own | {n: c for n in names if n not in own and (c := resistance_meaning(n, with_s))}
 
 
 def _watt_meters(names: Iterable[str]) -> dict[str, str]:
@@ -119,8 +123,16 @@ def winding_columns(names: Iterable[str]) -> dict[str, str]:
     )
 
 
-def resistance_meaning(name: str) -> str | None:
-    """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None."""
+def resistance_meaning(name: str, with_s: bool = False) -> str | None:
+    """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None. `with_s`: behind
+    words `RS` is between the terminals R and S, for another pair stands beside it; else it is the stator's symbol, which tells no more than
+    the words before it."""
+    bare = translated(_OHM_ENDING.sub("", IN_NAME.sub("", name).strip()))
+    if (found := _SYMBOL_BEHIND.fullmatch(bare)) is not None:
+        of_symbol = _of_resistance("r" + key_of(found[2]) if with_s and key_of(found[2]) == "rs" else key_of(found[2]))
+        if of_symbol in _BETWEEN:
+            return of_symbol
+        return _first(found[1], _of_resistance) or of_symbol
     return _first(name, _of_resistance)
 
 

@@ -65,7 +65,9 @@ def loads_in(name: str) -> tuple[str | None, ...]:
 
 def load_of(text: str) -> str | None:
     """The ending of the keys at the load that stands above a column (`75 %`, `3/4 load`): nothing for the whole; None of any other text."""
-    found = re.fullmatch(rf"({_LOAD_SAID})\s*%?", re.sub(r"load|last|charge|carga|carico", "", text.lower()).strip("[]() "))
+    found = re.fullmatch(
+        rf"({_LOAD_SAID})\s*%?", re.sub(r"load|last|charge|carga|carico", "", text.lower()).strip("[]() ")
+    )
     return _ENDINGS.get(found[1]) if found else None
 
 

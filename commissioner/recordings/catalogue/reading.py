@@ -31,6 +31,8 @@ from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import split
 from commissioner.recordings.sheet_names import is_sheet
 from commissioner.recordings.sheets.listed import Listed, listed
+from commissioner.recordings.sheets.upright import upright
+from commissioner.recordings.units import read_unit
 
 ENDINGS = (".csv", ".txt", ".tsv", *workbook.ENDINGS)
 LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 3
@@ -82,6 +84,8 @@ def sheet_in(path: Path) -> Sheet | None:
     text, _ = read_text(path)
     lines = [line.strip().lstrip("\ufeff") for line in text.replace("\r", "\n").split("\n") if line.strip()]
     if len(lines) > MOST_LINES or _is_table_of_samples(lines):
+        return None
+    if upright(text) is not None and not _is_of_a_type([cell for line in lines for cell in _cells(line)[:2]]):
         return None
     entries = _columned(lines, str(path)) or list(_table(lines, str(path)) or _lines(lines))
     return _sheet(entries, str(path)) if _are_enough({e.key for e in entries}) else None
@@ -138,25 +142,32 @@ def _key_in(called: Sequence[str], unit: str) -> str | None:
     if (key := names.key_of(words)) is not None or not symbols:
         return key
     meant = next((key for name in symbols if len(name) > 1 and (key := names.key_of(name))), None)
-    return meant if meant and (meant not in KEYS or unit_key(unit) in MEASURES.get(KEYS[meant][1], set()) | {""}) else None
+    return (
+        meant if meant and (meant not in KEYS or unit_key(unit) in MEASURES.get(KEYS[meant][1], set()) | {""}) else None
+    )
 
 
 def _in_columns(key: str, one: Listed, unit: str, source: str) -> list[Entry]:
     """The values of one quantity: one, or one for each load that stands above them. DataRefused: several motors."""
     name = " ".join(one.names)
+    filled = [value for value in one.values if value]
     loads = [names.load_of(above) for above in one.above]
-    if len(one.values) > 1 and None in loads and len(set(one.values)) > 1:
+    if len(set(filled)) > 1 and None in loads:
         raise refused(
-            f"{len(one.values)} values of {name} stand beside each other", ", ".join(one.values)[:80],
+            f"{len(filled)} values of {name} stand beside each other", ", ".join(filled)[:80],
             "one value of one motor at one frequency, or loads above the columns (100 %, 75 %, 50 %)", source,
         )  # fmt: skip
-    at = {load or "": value for load, value in zip(loads, one.values, strict=False)} or {"": one.values[0]}
+    at = (
+        {load or "": value for load, value in zip(loads, one.values, strict=False)}
+        if len(filled) > 1
+        else {"": filled[0]}
+    )
     at_loads = at if key in ("efficiency", "power_factor") else {"": at.get("", "")}
     return [Entry(key + load, name, value, unit) for load, value in at_loads.items() if value]
 
 
 def _is_unit(text: str) -> bool:
-    return unit_key(text) in UNITS or _WITHOUT.fullmatch(text) is not None
+    return unit_key(text) in UNITS or read_unit(text) is not None or _WITHOUT.fullmatch(text) is not None
 
 
 def _table(lines: Sequence[str], source: str) -> list[Entry]:

@@ -7,18 +7,53 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from commissioner.recordings.sheet_names import sheet_meaning
 from commissioner.recordings.units import IN_NAME, read_unit, unit_in
-from commissioner.records import IDLE_TEST, LOCKED_TEST, ReadingNote, Signal
+from commissioner.recordings.words import folded, translated
+from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, ReadingNote, Signal
 
-_SYMBOL = re.compile(r"([UVEIPWf])[_ ]?\{?(?:(0|nl|o)|(k|cc|sc|lr|br|bl|cto))\}?", re.IGNORECASE)
+_SYMBOL = re.compile(
+    r"([UVEIPWf])[_ ]?\{?(?:(?P<idle>0|nl|o)|(?P<locked>k|cc|sc|lr|br|bl|cto)|(?P<direct>dc|=))\}?", re.IGNORECASE
+)
+_TESTS = {"idle": IDLE_TEST, "locked": LOCKED_TEST, "direct": DIRECT_TEST}
+_INDEX = {IDLE_TEST: "0", LOCKED_TEST: "k", DIRECT_TEST: "dc"}
+_NEEDS = {IDLE_TEST: {"U", "I", "P"}, LOCKED_TEST: {"U", "I", "P"}, DIRECT_TEST: {"U", "I"}}
+_WORDS = {
+    IDLE_TEST: re.compile(r"no[\W_]*load|leerlauf(?:versuch)?s?|idling|idle|unloaded"),
+    LOCKED_TEST: re.compile(
+        r"(?:locked|blocked)[\W_]*(?:rotor)?|kurzschlu(?:ss|ß)(?:versuch)?s?|short[\W_]*circuit|festgebremst|stand[\W_]?still"
+    ),
+    DIRECT_TEST: re.compile(
+        r"(?<![a-z])d\.?c\.?(?![a-z])|direct(?:[\W_]*current(?=[\W_]+\w))?|gleich(?=spannung|strom)"
+    ),
+}
+"""What names of quantities say of their test."""
+_SPELT = {"voltage_line_v": "U", "current_line_a": "I", "power_w": "P", "frequency_hz": "f"}
 _KIND = {"u": "U", "v": "U", "e": "U", "i": "I", "p": "P", "w": "P", "f": "f"}
 MEASURES = {"U": "voltage", "I": "current", "P": "power", "f": "frequency"}
 SHOWN = {"U": "V", "I": "A", "P": "W", "f": "Hz"}
-CALLED = {IDLE_TEST: "no load", LOCKED_TEST: "locked rotor"}
+CALLED = {IDLE_TEST: "no load", LOCKED_TEST: "locked rotor", DIRECT_TEST: "direct current"}
+
+
+def is_symbol(name: str) -> bool:
+    """Whether a name is the symbol of a test's quantity: `U_0`, `Ik [A]`."""
+    return _SYMBOL.fullmatch(IN_NAME.sub("", name).strip()) is not None
+
+
+def symbol_of(name: str, titled: float) -> str:
+    """The symbol of what words mean together (`No-load voltage`: `U_0`), the test said by them or by the title above; nothing of a phase's
+    volts or amperes, whose connection is asked for elsewhere."""
+    plain = folded(translated(name)).lower()
+    test = next((test for test, words in _WORDS.items() if words.search(plain)), titled)
+    if test not in _INDEX:
+        return ""
+    bare = " ".join(_WORDS[test].sub(" ", plain).split()).strip(" -,:;/()")
+    kind = _SPELT.get(sheet_meaning(re.sub(r"\b(?:test|in|im|bei|at|of|the|am)\b", "", bare).strip(" -,:;/()")) or "")
+    return f"{kind}_{_INDEX[test]}" if kind else ""
 
 
 def tests_in(names: Sequence[str]) -> Mapping[float, Mapping[str, int]]:
-    """Of each test whose volts, amperes and watts are all there, once: the place of each symbol's name. None where other names count on
+    """Of each test whose volts, amperes and watts (beside another, of direct current volts and amperes) are all there, once: the place of each symbol's name. None where other names count on
     (`I0`, `I1`): then they are phases."""
     found: dict[float, dict[str, int]] = {}
     bare = [IN_NAME.sub("", name).strip() for name in names]
@@ -27,12 +62,13 @@ def tests_in(names: Sequence[str]) -> Mapping[float, Mapping[str, int]]:
     for k, name in enumerate(bare):
         if (one := _SYMBOL.fullmatch(name)) is None:
             continue
-        of_test = found.setdefault(IDLE_TEST if one[2] else LOCKED_TEST, {})
+        of_test = found.setdefault(_TESTS[one.lastgroup or ""], {})
         kind = _KIND[one[1].lower()]
         if kind in of_test:
             return {}
         of_test[kind] = k
-    return {test: of for test, of in found.items() if {"U", "I", "P"} <= of.keys()}
+    whole = {test: of for test, of in found.items() if _NEEDS[test] <= of.keys()}
+    return whole if whole.keys() - {DIRECT_TEST} else {}
 
 
 def in_rows(
@@ -48,6 +84,8 @@ def in_rows(
     parts: list[list[Signal]] = []
     for test, of in tests.items():
         own = [_in_si(of.get(kind), kind, names, units, values) for kind in kinds]
+        if test == DIRECT_TEST:
+            own = [_of_direct(kind, column, own, kinds) for kind, column in zip(kinds, own, strict=True)]
         rows = np.isfinite(own).any(axis=0)
         parts.append([column[rows] for column in (np.full(rows.size, test), *own, *(values[k] for k in others))])
     columns = tuple(np.concatenate(part) for part in zip(*parts, strict=True))
@@ -55,6 +93,13 @@ def in_rows(
     note = ReadingNote("indexed_tests", "; ".join(said) + "; each of its points was taken as a row")
     called = ("test", *kinds, *(names[k] for k in others))
     return called, ("", *(SHOWN[kind] for kind in kinds), *(units[k] for k in others)), columns, [note]
+
+
+def _of_direct(kind: str, column: Signal, own: Sequence[Signal], kinds: Sequence[str]) -> Signal:
+    """Of direct current what a sheet leaves out: its frequency is zero, its watts are volts times amperes."""
+    volts, amps = own[kinds.index("U")], own[kinds.index("I")]
+    left_out = {"f": np.where(np.isfinite(volts), 0.0, np.nan), "P": volts * amps}.get(kind, column)
+    return np.where(np.isfinite(column), column, left_out)
 
 
 def _factor(k: int, kind: str, names: Sequence[str], units: Sequence[str]) -> float | None:

@@ -25,10 +25,11 @@ HEADS = {
 """What the columns are called, without accents."""
 _ROLE = {word: role for role, words in HEADS.items() for word in words.split()}
 MARKS = (";", "\t", "|", ",", "  ")
-DRAWN = ("|", "  ")
+DRAWN = ("|", "  ", ":", "=")
 """Between columns, and nowhere else in a list: two columns are one."""
-FEWEST, MOSTLY = 3, 0.6
-"""Rows that make a list; the part of a column's cells that begin with a number where it holds values."""
+FEWEST, MOSTLY, UNITS_PART = 3, 0.6, 0.75
+"""Rows that make a list; the parts of a column's cells that begin with a number where it holds values, and that are known units where it
+holds units: pages name some that no quantity here has (kg, dB(A))."""
 _BEGINS = re.compile(r"\s*(?:ca\.?|~|≈)?\s*[-+]?[.,]?\d")
 _RULE = re.compile(r"[\s|:+=_-]+")
 """A line drawn under a head."""
@@ -36,8 +37,8 @@ _RULE = re.compile(r"[\s|:+=_-]+")
 
 @dataclass(frozen=True)
 class Listed:
-    """A quantity, or a title without values: its names in the order of their columns; `unit` as printed; `values` of every column of values,
-    and what stands above these (`100 %`, `Motor A`)."""
+    """A quantity, or a title without values: its names in the order of their columns; `unit` as printed; `values` of every column of values (empty
+    where this one has none), and what stands above these (`100 %`, `Motor A`)."""
 
     names: tuple[str, ...]
     unit: str
@@ -45,9 +46,9 @@ class Listed:
     above: tuple[str, ...] = ()
 
 
-def listed(lines: Sequence[str], is_unit: Callable[[str], bool]) -> tuple[Listed, ...]:
+def listed(lines: Sequence[str], is_unit: Callable[[str], bool], marks: Sequence[str] = MARKS) -> tuple[Listed, ...]:
     """The quantities, rows of one cell (titles) among them without values; nothing where the lines are no list of such columns."""
-    return next((found for mark in MARKS if (found := _between(lines, mark, is_unit))), ())
+    return next((found for mark in marks if (found := _between(lines, mark, is_unit))), ())
 
 
 def _between(lines: Sequence[str], mark: str, is_unit: Callable[[str], bool]) -> tuple[Listed, ...]:
@@ -69,6 +70,8 @@ def _between(lines: Sequence[str], mark: str, is_unit: Callable[[str], bool]) ->
 def _cells(line: str, mark: str) -> list[str]:
     if mark == "  ":
         return [cell.strip() for cell in re.split(r" {2,}|\t", line.strip())]
+    if mark in (":", "="):
+        return [cell.strip() for cell in line.split(mark, 1)]
     if mark == "|":
         return [cell.strip() for cell in line.strip().strip("|").split("|")]
     return [cell.strip('" ') for cell in split(line, mark)]
@@ -104,7 +107,7 @@ def _fitted(row: Sequence[str], width: int) -> list[str]:
 
 def _roles(rows: Sequence[Sequence[str]], head: Sequence[str], is_unit: Callable[[str], bool]) -> list[str]:
     """The roles by the words above the columns, else by what stands in them."""
-    whole = [row for row in rows if any(map(is_number, row)) or sum(map(bool, row)) > 2]
+    whole = [row for row in rows if any(map(_BEGINS.match, row[1:])) or sum(map(bool, row)) > 2]
     columns = [[row[k] for row in whole if row[k]] for k in range(len(head))]
     said = [_ROLE.get(_word(cell), "") for cell in head]
     is_titled = any(said)
@@ -116,7 +119,8 @@ def _roles(rows: Sequence[Sequence[str]], head: Sequence[str], is_unit: Callable
     last = min((k for k, role in enumerate(roles) if role == VALUE), default=0)
     is_open = NAME not in said
     return [
-        role or (NAME if k < last and (is_open or not said[k]) and not is_titled else ASIDE) for k, role in enumerate(roles)
+        role or (NAME if k < last and (is_open or not said[k]) and not is_titled else ASIDE)
+        for k, role in enumerate(roles)
     ]
 
 
@@ -124,7 +128,7 @@ def _told(cells: Sequence[str], place: int, is_unit: Callable[[str], bool]) -> s
     """The role of a column by its cells; nothing where they are words."""
     if not cells:
         return ASIDE
-    if place and len(cells) >= FEWEST - 1 and all(map(is_unit, cells)):
+    if place and len(cells) >= FEWEST - 1 and sum(map(is_unit, cells)) > UNITS_PART * len(cells):
         return UNIT
     if place and sum(bool(_BEGINS.match(cell)) for cell in cells) > MOSTLY * len(cells):
         return VALUE
@@ -133,14 +137,15 @@ def _told(cells: Sequence[str], place: int, is_unit: Callable[[str], bool]) -> s
 
 def _listed(row: Sequence[str], roles: Sequence[str], head: Sequence[str]) -> Listed:
     """A row's quantity; of one that is too short for its columns (`Schaltung;Dreieck`) the last cell is the value."""
+
     def of(wanted: str) -> tuple[str, ...]:
         return tuple(cell for cell, role in zip(row, roles, strict=True) if role == wanted and cell)
 
     filled = [cell for cell in row if cell]
     if len(filled) == 2 and not of(VALUE):
         return Listed((filled[0],), "", (filled[1],))
-    values = [(cell, above) for cell, role, above in zip(row, roles, head, strict=True) if role == VALUE and cell]
+    values = [(cell, above) for cell, role, above in zip(row, roles, head, strict=True) if role == VALUE]
     return Listed(
         (*of(NAME), *of(SYMBOL)) or tuple(filled[:1]), next(iter(of(UNIT)), ""),
-        tuple(cell for cell, _ in values), tuple(above for _, above in values),
+        tuple(cell for cell, _ in values) if of(VALUE) else (), tuple(above for _, above in values),
     )  # fmt: skip

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
 from commissioner.recordings.reading.said_tests import codes
-from commissioner.recordings.sheet_names import is_sheet, sheet_columns
-from commissioner.recordings.sheets.indexed import tests_in
+from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns
+from commissioner.recordings.sheets.indexed import is_symbol, symbol_of, tests_in
+from commissioner.recordings.sheets.listed import MARKS as LISTED
+from commissioner.recordings.sheets.listed import listed
 from commissioner.recordings.units import FOREIGN, read_unit, unit_in
 
 MOST_BYTES, MOST_LINES = 20_000, 80
@@ -35,7 +37,7 @@ def upright(text: str) -> str | None:
     lines = [line.text.strip().lstrip("\ufeff") for line in head_lines(text) if line.text.strip()]
     if not 3 <= len(lines) <= MOST_LINES:
         return None
-    return next((found for mark in MARKS if (found := _turned(lines, mark))), None)
+    return next((found for mark in MARKS if (found := _turned(lines, mark))), None) or _turned(_spelt(lines), ";")
 
 
 def _turned(lines: Sequence[str], mark: str) -> str | None:
@@ -58,6 +60,35 @@ def _turned(lines: Sequence[str], mark: str) -> str | None:
     body = [between.join(cells) for cells in (head, *zip(*columns, strict=True))]
     others = [f"# {row[0]}: {' '.join(row[1:])}" for row in rows if _is_beside(row, points)]
     return "\n".join([*said, *others, *body]) + "\n"
+
+
+def _spelt(lines: Sequence[str]) -> list[str]:
+    """A list with columns of symbols, units and values, or with titles between its values, as `name;unit;values`: those of a test by its
+    symbol, which their own, their words or the title above say. Lines above it as they are; nothing of other forms."""
+    found = listed(lines, _is_unit, (*LISTED, ":", "="))
+    if not found:
+        return []
+    said = [line for line in lines if line.startswith("#")]
+    above = next((one.above for one in found if any(one.above)), ())
+    out = [*said, *([";".join(["", "", *above])] if above else [])]
+    titled = float("nan")
+    for one in found:
+        if one.values:
+            out.append(";".join((_called(one.names, titled), *filter(None, [one.unit]), *one.values)))
+        else:
+            code = codes(one.names[:1])
+            titled = float("nan") if code is None else float(code[0])
+    return out
+
+
+def _called(names: Sequence[str], titled: float) -> str:
+    """Of a quantity's names the symbol of a test, or the one that a test sheet knows."""
+    symbol = next((name for name in names if is_symbol(name)), "")
+    spelt = (spelt for name in names if (spelt := symbol_of(name, titled)))
+    together = " ".join(names)
+    if symbol or (symbol := next(spelt, "")):
+        return symbol
+    return together if resistance_meaning(together) else next((n for n in names if sheet_columns([n])), names[0])
 
 
 def _cells(line: str, mark: str) -> list[str]:
