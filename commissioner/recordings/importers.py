@@ -46,6 +46,7 @@ from commissioner.recordings.reading.preface import Clock, clock_in, factors_sai
 from commissioner.recordings.reading.recognise import Recognised, quantity, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
 from commissioner.recordings.sheet_names import is_sheet, sheet_meaning
+from commissioner.recordings.sheets.widened import is_long
 from commissioner.recordings.standstill.components import along_axis, with_phases
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
@@ -194,7 +195,7 @@ def _is_plain(path: Path) -> bool:
     names, cells = (split(line, ",") for line in lines)
     if not any(name in CONTRACT_COLUMNS for name in names) or len(names) != len(cells):
         return False
-    plain = all(name in CONTRACT_COLUMNS or not unit_in(name) for name in names)
+    plain = not is_long(names) and all(name in CONTRACT_COLUMNS or not unit_in(name) for name in names)
     return plain and all(is_number(cell) or not cell for cell in cells)
 
 

@@ -35,6 +35,7 @@ from commissioner.recordings.reading.rows import WrongRow, without_headers, with
 from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
 from commissioner.recordings.sheets.indexed import in_rows
 from commissioner.recordings.sheets.upright import upright
+from commissioner.recordings.sheets.widened import widened
 from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
@@ -74,7 +75,8 @@ def read_text(path: Path) -> tuple[str, str]:
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
     turned = upright(text)
-    text = text if turned is None else turned
+    wide = widened(text, source) if turned is None else None
+    text = turned or wide or text
     layout = layout_of(text, source)
     if layout.is_split:
         raise DataRefused(
@@ -99,6 +101,8 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
                 "upright", "quantities stand down the rows: each column of numbers was taken as a point of the test"
             )
         )
+    if wide is not None:
+        notes.append(ReadingNote("long_table", "a row for each channel and time: each channel was taken as a column"))
     names, units, points, of_tests = in_rows(names, units, columns)
     notes += of_tests
     once = units_said(said, (" ; ".join(row) for row in layout.preface))
