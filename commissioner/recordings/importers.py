@@ -18,6 +18,7 @@ import numpy as np
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import Nameplate
 from commissioner.paths import no_file
+from commissioner.recordings.catalogue.plate_said import plate_said
 from commissioner.recordings.formats import comtrade, mdf4, structures, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
 from commissioner.recordings.formats.kinds import require_kind
@@ -250,7 +251,8 @@ def _table(
     notes: tuple[ReadingNote, ...],
 ) -> Table:  # fmt: skip
     """What was recognised with a time, without doubled rows and rounded stamps."""
-    metadata = {**metadata, **mapping.metadata}
+    said, of_plate = plate_said({**metadata, **mapping.metadata}, source)
+    metadata = {**said, **metadata, **mapping.metadata}
     if is_sheet(r.name for r in found.readings):
         metadata = {**windings_said(metadata, source), **metadata}
     columns, shorter = _of_one_length(found.columns)
@@ -265,7 +267,11 @@ def _table(
     columns, along = along_axis(columns, source)
     unnamed = [ReadingNote(UNNAMED, f"{name}: its name does not say what it is") for name in found.unnamed]
     return Table(
-        columns, metadata, source, (*notes, *found.notes, *shorter, *timed, *phases, *along, *unnamed), found.readings
+        columns,
+        metadata,
+        source,
+        (*notes, *of_plate, *found.notes, *shorter, *timed, *phases, *along, *unnamed),
+        found.readings,
     )
 
 

@@ -243,6 +243,11 @@ def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:
     return replace(sheet, values={**sheet.values, key: value})
 
 
+def values_of(entry: Entry, sheet: Sheet) -> list[tuple[str, Value]]:
+    """The values of one entry that stands alone, with their keys; of two connections' that of the sheet's."""
+    return list(_read(entry, sheet, [], []))
+
+
 def _read(entry: Entry, sheet: Sheet, unsaid: list[str], remarks: list[str]) -> Iterator[tuple[str, Value]]:
     """The values of one entry, with their keys."""
     if entry.key == "winding_resistance" and (at := _AT.search(f"{entry.name} {entry.printed}")) is not None:
