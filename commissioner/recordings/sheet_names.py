@@ -61,6 +61,11 @@ SHEET_RESISTANCE = {
 """Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
 _TERMINALS = re.compile(rf"{_OF_WINDING}(?:between)?(?:terminals)?l?([abcuvwrst123])l?([abcuvwrst123])")
 _BETWEEN = frozenset(f"winding_resistance_{pair}_ohm" for pair in ("uv", "vw", "wu"))
+_TERMINALS_SAID = re.compile(
+    r"[(\[]\s*(?:(?:measured|gemessen)?\s*(?:between|at|zwischen|an)?\s*(?:two|zwei|2)?\s*(?:terminals?|klemmen)|line[ -]?to[ -]?line)\s*[)\]]",
+    re.IGNORECASE,
+)
+"""In brackets behind a resistance's name: `Rs (between terminals)`."""
 _SYMBOL_BEHIND = re.compile(r"(.*(?:resistance|widerstand))[\s,(]+(R[ _-]?[A-Za-z0-9-]{0,5})\)?", re.IGNORECASE)
 """A symbol behind words of the same: `Stator resistance Rs`, `Winding resistance R_UV`."""
 _WINDING = re.compile(rf"{_OF_WINDING}(?:(?:of)?(?:phase|winding|strang)l?([123uvwabcrst])|l([123])|([uvwabcrst]))")
@@ -128,6 +133,8 @@ def resistance_meaning(name: str, with_s: bool = False) -> str | None:
     words `RS` is between the terminals R and S, for another pair stands beside it; else it is the stator's symbol, which tells no more than
     the words before it."""
     bare = translated(_OHM_ENDING.sub("", IN_NAME.sub("", name).strip()))
+    if _TERMINALS_SAID.search(translated(name)) and _first(_TERMINALS_SAID.sub("", translated(name)), _of_resistance):
+        return "winding_resistance_line_ohm"
     if (found := _SYMBOL_BEHIND.fullmatch(bare)) is not None:
         of_symbol = _of_resistance("r" + key_of(found[2]) if with_s and key_of(found[2]) == "rs" else key_of(found[2]))
         if of_symbol in _BETWEEN:

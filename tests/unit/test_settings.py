@@ -94,8 +94,8 @@ def test_a_decimal_comma_is_told_with_its_line_and_the_point(tmp_path):
     number = PLATE.splitlines().index(current) + 1
     with pytest.raises(ConfigurationError) as caught:
         load_motor(_motor(tmp_path, PLATE.replace(current, "rated_current_a = 4,86  # A")))
-    assert f"in line {number} a decimal comma" in caught.value.remedy
-    assert "rated_current_a = 4.86" in caught.value.remedy
+    assert f"in line {number} a decimal comma" in caught.value.limit
+    assert "rated_current_a = 4.86" in caught.value.limit
 
 
 def test_broken_toml_and_missing_files_are_named(tmp_path):
@@ -161,7 +161,7 @@ def test_times_that_contradict_each_other_are_refused_with_both_keys(tmp_path, r
     assert (error.exit_code, error.step) == (2, "read configuration")
     assert (error.key, error.value, error.limit) == (key, value, limit)
     assert key in error.remedy
-    assert "limits.axis_time_s" in error.remedy
+    assert "limits.axis_time_s" in error.limit
 
 
 def test_a_run_may_be_as_long_as_its_one_test_and_a_test_just_longer_than_its_tones(tmp_path):

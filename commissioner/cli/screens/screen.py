@@ -82,14 +82,13 @@ def busy(doing: str) -> Iterator[None]:
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
     err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
-    remedy = once(error.remedy, error.limit)
-    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", remedy)):
+    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
         if fact not in (None, ""):
             err.print(f"  [dim]{name:<7}[/]{text(shown(fact, error.unit), SENTENCE)}")
 
 
 def once(remedy: str, limit: object) -> str:
-    """The remedy without the limit behind it, which stands in the line above: a file's error says there what is expected."""
+    """The remedy without the limit behind it, which stands in the line above: so archives of runs before November 2026 hold it."""
     return remedy.removesuffix(f": {limit}") if limit not in (None, "") else remedy
 
 

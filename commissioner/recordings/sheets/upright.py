@@ -17,6 +17,8 @@ from commissioner.recordings.units import FOREIGN, read_unit, unit_in
 
 MOST_BYTES, MOST_LINES = 20_000, 80
 MARKS = (";", "\t", ",", ":", "=")
+_CERTAIN = re.compile(r"[-+]?(?:0[.,]\d+|\d+(?:[.,](?!\d{3}$)\d+)?)")
+"""A number whose mark can only be a decimal one."""
 _CELL = re.compile(r"([-+]?[\d.,' ]*\d(?:[eE][-+]?\d+)?)\s*(\D*)")
 
 
@@ -103,16 +105,35 @@ def _quantity(row: Sequence[str]) -> _Line | None:
     if len(row) < 2 or not row[0] or is_number(row[0]):
         return None
     has_unit = len(row) > 2 and bool(row[1]) and not is_number(row[1]) and _is_unit(row[1])
-    found = [_CELL.fullmatch(cell) if cell else None for cell in row[2 if has_unit else 1 :]]
-    if not any(found) or any(
-        cell and one is None for cell, one in zip(row[2 if has_unit else 1 :], found, strict=True)
+    matched = [_CELL.fullmatch(cell) if cell else None for cell in row[2 if has_unit else 1 :]]
+    if not any(matched) or any(
+        cell and one is None for cell, one in zip(row[2 if has_unit else 1 :], matched, strict=True)
     ):
         return None
-    behind = {one[2].strip() for one in found if one}
+    found = _in_one_unit(matched)
+    behind = {one[1] for one in found if one}
     if len(behind) > 1 or not (behind == {""} or (not has_unit and all(map(_is_unit, behind)))):
         return None
     unit = row[1].strip("[]() ") if has_unit else behind.pop()
-    return _Line(row[0], unit, tuple(one[1].strip() if one else "" for one in found))
+    return _Line(row[0], unit, tuple(one[0] if one else "" for one in found))
+
+
+def _in_one_unit(cells: Sequence[re.Match[str] | None]) -> list[tuple[str, str] | None]:
+    """(number, unit) of each cell, all in the unit of the first where their own measure the same (`0.42 kW` beside `920 W`)."""
+    said = [(one[1].strip(), one[2].strip()) if one else None for one in cells]
+    units = [read_unit(one[1]) if one else None for one in said]
+    known = [unit for unit in units if unit]
+    if not all(_CERTAIN.fullmatch(one[0]) for one in said if one):
+        return said
+    if len({one[1] for one in said if one}) < 2 or len(known) != sum(one is not None for one in said):
+        return said
+    if len({(unit.measures, unit.is_ambiguous, unit.offset) for unit in known}) > 1:
+        return said
+    first = next(one[1] for one in said if one)
+    return [
+        (f"{float(one[0].replace(',', '.')) * unit.scale / known[0].scale:.12g}", first) if one and unit else None
+        for one, unit in zip(said, units, strict=True)
+    ]
 
 
 def _is_unit(text: str) -> bool:

@@ -78,3 +78,10 @@ def test_a_configurations_error_says_each_thing_once(capsys):
     failure(ConfigurationError(file="m.toml", key="pole_pairs", value=0, expected="pole pairs: 1 or more"))
     shown = " ".join(capsys.readouterr().err.split())
     assert shown.count("1 or more") == 1 and shown.endswith("remedy correct pole_pairs in m.toml")
+
+
+def test_its_document_says_each_thing_once_too():
+    from commissioner.errors import ConfigurationError
+
+    error = ConfigurationError(file="m.toml", key="pole_pairs", value=0, expected="pole pairs: 1 or more").as_dict()
+    assert (error["limit"], error["remedy"]) == ("pole pairs: 1 or more", "correct pole_pairs in m.toml")

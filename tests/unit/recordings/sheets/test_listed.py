@@ -129,6 +129,8 @@ def test_a_motors_tests_are_read_in_columns(tmp_path, order, mark, head):
         "Current;I;A;8.17\nPower;P;W;420\nLocked-rotor test;;;\nVoltage;U;V;25\nFrequency;f;Hz;15\nCurrent;I;A;27.9\nPower;P;W;920\n",
         "No-load test\nVoltage: 208 V\nFrequency: 60 Hz\nCurrent: 8.17 A\nPower: 420 W\n\nLocked rotor test\nVoltage: 25 V\nFrequency: 15 Hz\n"
         "Current: 27.9 A\nPower: 920 W\n\nWinding resistance R_uv: 0.48571 Ohm\n",
+        "Parameter;No load;Locked rotor\nVoltage;208 V;25 V\nCurrent;8170 mA;27.9 A\nPower;0.42 kW;920 W\nFrequency;60 Hz;15 Hz\n"
+        "Rs (between terminals);0.48571 Ohm;485.71 mOhm\n",
         "Quantity;Symbol;Unit;DC test;No-load test;Locked-rotor test\nFrequency;f;Hz;;60;15\nVoltage;U;V;13.6;208;25\nCurrent;I;A;28;8.17;27.9\n"
         "Power;P;W;;420;920\n",
     ],
@@ -143,11 +145,18 @@ def test_tests_are_told_by_words_symbols_titles_or_columns(tmp_path, text):
     ("name", "column"),
     [("Stator resistance Rs [Ohm]", "stator_resistance_ohm"), ("Winding resistance Rs", "winding_resistance_ohm"),
      ("Stator resistance R1 (ohm)", "stator_resistance_ohm"), ("Winding resistance R_UV [mOhm]", "winding_resistance_uv_ohm"),
-     ("Resistance R1-2", "winding_resistance_uv_ohm")],
+     ("Resistance R1-2", "winding_resistance_uv_ohm"), ("Rs (between terminals)", "winding_resistance_line_ohm")],
 )  # fmt: skip
 def test_a_symbol_behind_the_words_of_a_resistance_makes_it_none_between_terminals_s(name, column):
     """`Stator resistance Rs` had been taken as between the terminals R and S: half of it."""
     assert resistance_meaning(name) == column
+
+
+@pytest.mark.parametrize("cell", ["1,420", "1.420", "1.234,5"])
+def test_thousands_beside_another_unit_are_not_guessed(tmp_path, cell):
+    text = f"Parameter;No load;Locked rotor\nVoltage;208 V;25 V\nCurrent;8.17 A;27.9 A\nPower;{cell} W;0.92 kW\nFrequency;60 Hz;15 Hz\n"
+    with pytest.raises(DataRefused):
+        identify_any(IdentifyRequest((write(tmp_path, text + "R_uv;0.4857 Ohm;0.4857 Ohm\n"),)))
 
 
 def test_terminals_r_and_s_are_told_by_the_other_pairs():

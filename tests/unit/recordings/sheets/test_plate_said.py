@@ -19,7 +19,9 @@ def read(tmp_path: Path, above: str, mark: str = ",") -> Table:
     ]
     body = "\n".join(mark.join(f"{x:.4f}" for x in row) for row in rows)
     path = tmp_path / "recording.csv"
-    names = mark.join(f"{name} [{unit}]" for name, unit in zip(["t", "Ia", "Ib", "Ic", "Va", "Vb", "Vc"], "sAAAVVV", strict=True))
+    names = mark.join(
+        f"{name} [{unit}]" for name, unit in zip(["t", "Ia", "Ib", "Ic", "Va", "Vb", "Vc"], "sAAAVVV", strict=True)
+    )
     path.write_text(f"{above}\n{names}\n{body if mark == ',' else body.replace('.', ',')}\n", encoding="utf-8")
     return contract_table(path)
 
