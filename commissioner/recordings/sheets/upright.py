@@ -54,7 +54,10 @@ def _turned(lines: Sequence[str], mark: str) -> str | None:
     if any(is_sheet(row) or len(tests_in(row)) > 0 for row in rows):
         return None
     titles = next((title for row in rows if (title := _titles(row, points))), ())
-    head = [f"{one.name} [{one.unit}]" if one.unit and not unit_in(one.name) else one.name for one in quantities]
+    head = [
+        f"{one.name} [{one.unit}]" if one.unit and read_unit(unit_in(one.name)) is None else one.name
+        for one in quantities
+    ]
     columns = [one.values for one in quantities]
     if titles:
         head, columns = ["test", *head], [titles, *columns]

@@ -98,6 +98,8 @@ POINT = frozenset(
 """What the columns are called, as `key_of` their names; the rows' key is a time, or a point's number."""
 MARKS = (";", "\t", ",")
 FEWEST_CELLS, MOST_CELLS = 3, 8
+MOST_NUMBERS = 10
+"""Rows of numbers above the names of a long table: more are the numbers of another."""
 
 
 @dataclass(frozen=True)
@@ -140,15 +142,19 @@ def is_long(cells: Sequence[str]) -> bool:
 
 
 def _head(text: str) -> _Head | None:
+    """The line of names, which holds no number; sought no further than a few rows of numbers, for every file is asked."""
+    of_numbers = 0
     for line in head_lines(text):
         if line.text.startswith("#") or not line.text.strip():
             continue
         for mark in MARKS:
             cells = tuple(cell.strip('" \ufeff') for cell in split(line.text, mark))
-            if len(cells) > 1 and all(map(is_number, cells)):
-                return None  # the numbers have begun
-            if FEWEST_CELLS <= len(cells) <= MOST_CELLS and (found := _placed(line.start, mark, cells)):
+            numbers = sum(map(is_number, cells))
+            of_numbers += numbers > 1
+            if not numbers and FEWEST_CELLS <= len(cells) <= MOST_CELLS and (found := _placed(line.start, mark, cells)):
                 return found
+        if of_numbers > MOST_NUMBERS:
+            return None
     return None
 
 
@@ -156,8 +162,10 @@ def _placed(start: int, mark: str, cells: tuple[str, ...]) -> _Head | None:
     said = [key_of(translated(cell)) for cell in cells]
     of = {role: [k for k, key in enumerate(said) if key in words] for role, words in
           (("channel", CHANNEL), ("value", VALUE), ("unit", UNIT), ("point", POINT))}  # fmt: skip
+    if len(of["channel"]) != 1 or len(of["value"]) != 1 or len(of["unit"]) > 1:
+        return None
     keys = [k for k, cell in enumerate(cells) if meaning_of(cell) == "time_s"] or of["point"]
-    if len(keys) != 1 or len(of["channel"]) != 1 or len(of["value"]) != 1 or len(of["unit"]) > 1:
+    if len(keys) != 1:
         return None
     return _Head(start, mark, cells, keys[0], of["channel"][0], of["value"][0], next(iter(of["unit"]), None))
 

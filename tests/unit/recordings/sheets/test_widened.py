@@ -9,6 +9,7 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.importers import contract_table
+from commissioner.recordings.sheets import widened as widened_module
 from commissioner.recordings.table import Table
 
 TIMES = [f"{0.001 * k:.4f}" for k in range(60)]
@@ -77,3 +78,12 @@ def test_points_and_tests_in_a_long_table_are_a_sheet(tmp_path):
     table = read(tmp_path, "Test;Quantity;Unit;Value\n" + "\n".join(rows) + "\n")
     assert table.columns["voltage_line_v"].tolist() == [208, 25] and table.columns["test"].tolist() == [1, 2]
     assert table.columns["winding_resistance_uv_ohm"].tolist() == [0.4857, 0.4857]
+
+
+def test_a_wide_table_is_asked_no_more_than_its_head(tmp_path, monkeypatch):
+    """Every line had been looked up: a recording with dates was read in 1.4 s instead of 0.1 s."""
+    asked = []
+    monkeypatch.setattr(widened_module, "key_of", lambda name: asked.append(name) or name)
+    rows = "\n".join(f"01.02.2024;10:00:{k:06.3f};1.5;2.5" for k in range(300))
+    assert widened_module.widened(f"Date;Time;Ia;Ib\n{rows}\n", "x") is None
+    assert len(asked) < 20
