@@ -33,6 +33,7 @@ from commissioner.recordings.reading.preface import (
 )
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
 from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
+from commissioner.recordings.sheets.barred import unbarred
 from commissioner.recordings.sheets.indexed import in_rows
 from commissioner.recordings.sheets.upright import upright
 from commissioner.recordings.sheets.widened import widened
@@ -74,6 +75,7 @@ def read_text(path: Path) -> tuple[str, str]:
 
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
+    text = unbarred(text)
     turned = upright(text)
     wide = widened(text, source) if turned is None else None
     text = turned or wide or text
