@@ -138,6 +138,13 @@ def test_a_number_that_only_looks_like_one_with_a_unit_is_not_blamed(tmp_path):
     assert "in line 3 a unit stands behind the number: rated_current_a = 5" in caught.value.remedy
 
 
+def test_one_pole_pair_is_one(tmp_path):
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(_motor(tmp_path, PLATE.replace("pole_pairs = 2", "pole_pairs = 1")))
+    assert "3000 1/min of 1 pole pair at 50 Hz" in str(caught.value.limit)
+    assert "is of 2 pole pairs" in str(caught.value.limit)
+
+
 @pytest.mark.parametrize("key", ["pole_pairs", "rated_power_w", "inertia_kg_m2"])
 def test_true_is_no_number(tmp_path, key):
     old = next(one for one in PLATE.splitlines() if one.startswith(key))
