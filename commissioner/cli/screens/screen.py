@@ -93,9 +93,17 @@ def once(remedy: str, limit: object) -> str:
     return remedy.removesuffix(f": {limit}") if limit not in (None, "") else remedy
 
 
+_SIGNS = (
+    (r"\+-", "±"), (r"->", "→"), (r"\b([LT])_sigma\b", r"\1_σ"), (r"(\d) us\b", r"\1 µs"), (r"(\d) ohm\b", r"\1 Ω"),
+    (r"(\d) deg\b", r"\1°"),
+)  # fmt: skip
+
+
 def signs(sentence: str) -> str:
     """A document's sentence with the signs that the tables beside it have; a console that lacks them spells them out."""
-    return re.sub(r"(\d) us\b", r"\1 µs", sentence.replace("+-", "±"))
+    for spelt, sign in _SIGNS:
+        sentence = re.sub(spelt, sign, sentence)
+    return sentence
 
 
 def text(value: object, longest: int = LONGEST) -> str:
