@@ -97,7 +97,7 @@ class ConfigurationError(UsageError):
             step="read configuration",
             value=value if isinstance(value, int | float) or value == shown.strip("'") else shown,
             limit=expected,
-            remedy=f"correct {key} in {file}",
+            remedy=f"correct {key} in {file}: {expected}",
         )
         self.file = file
         self.key = key

@@ -9,28 +9,43 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import Nameplate, check, connection_of
 from commissioner.paths import no_file
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
-from commissioner.validation import first_problem
+from commissioner.validation import FileTable, first_problem
 
 CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
 MAX_BYTES, MAX_DOTS = 250_000, 500
 """Of a TOML file, and in one line of it: the time that a dotted key takes grows with the square of its parts."""
-DECIMAL_COMMA = re.compile(r"([\w.-]{1,60}?)\s*=\s*([+-]?\d{1,15}),(\d{1,15})\s*(?:#.*)?")
+_KEY, _NUMBER, _REST = r"(?P<key>[\w.-]{1,60})\s*", r"(?P<value>[+-]?\d{1,15}(?:\.\d{0,15})?)", r"\s*(?:#.*)?"
+SLIPS: tuple[tuple[re.Pattern[str], str, str], ...] = tuple(
+    (re.compile(pattern), what, right)
+    for pattern, what, right in (
+        (
+            rf"{_KEY}=\s*(?P<value>[+-]?\d{{1,15}}),(?P<more>\d{{1,15}}){_REST}",
+            "a decimal comma stands where TOML has a point", "{key} = {value}.{more}",
+        ),
+        (rf"{_KEY}:\s*(?P<value>[^=:]{{1,60}})", "a colon stands where TOML has =", "{key} = {value}"),
+        (rf"{_KEY}=\s*{_NUMBER}\s*(?:[A-Za-z°%][\w/°%]{{0,10}}){_REST}", "a unit stands behind the number", "{key} = {value}"),
+        (
+            rf"{_KEY}=\s*[“”„‘’«»‚](?P<value>[^“”„‘’«»‚]{{0,60}})[“”„‘’«»‚]{_REST}",
+            "a text stands in typographic quotes", '{key} = "{value}"',
+        ),
+        (rf"{_KEY}=\s*(?P<value>(?!(?:true|false|inf|nan)\b)[A-Za-z][\w -]{{0,60}}?){_REST}", "a text stands without quotes", '{key} = "{value}"'),
+        (rf"{_KEY}={_REST}", "nothing stands behind the =", "{key} = ..."),
+    )
+)  # fmt: skip
+"""What people write into a line in place of TOML: how it looks, what it is, how TOML writes it."""
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 Percent = Annotated[float, Field(gt=0, le=100)]
 
 
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class MotorFile(_File):
+class MotorFile(FileTable):
     """`config/motors/*.toml`: what the plate says."""
 
     name: str = ""
@@ -49,19 +64,19 @@ class MotorFile(_File):
     inertia_kg_m2: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
 
 
-class _Axes(_File):
+class _Axes(FileTable):
     orientations_deg: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=12)]
     repeat_first: bool
 
 
-class _Supervision(_File):
+class _Supervision(FileTable):
     watchdog_s: Annotated[float, Field(ge=0.1, le=2.0)]
     max_watchdog_s: Annotated[float, Field(ge=0.1, le=2.0)]
     standstill_dwell_s: Annotated[float, Field(ge=0.05, le=60)]
     reply_timeout_s: Annotated[float, Field(ge=0.02, le=5)]
 
 
-class _Limits(_File):
+class _Limits(FileTable):
     current_fraction: Annotated[float, Field(gt=0.05, le=1.2)]
     trip_fraction: Annotated[float, Field(gt=0.1, le=2.0)]
     flux_fraction: Annotated[float, Field(gt=0.1, le=0.98)]
@@ -69,14 +84,14 @@ class _Limits(_File):
     total_time_s: Annotated[float, Field(gt=1, le=7200)]
 
 
-class _Excitation(_File):
+class _Excitation(FileTable):
     seconds: Annotated[float, Field(ge=2, le=600)]
     staircase_seconds: Annotated[float, Field(ge=1, le=120)]
     first_scale: Annotated[float, Field(gt=0, le=0.5)]
     scale_ramp_per_s: Annotated[float, Field(gt=0, le=10)]
 
 
-class _Acceptance(_File):
+class _Acceptance(FileTable):
     resistance_std_percent: Percent
     leakage_std_percent: Percent
     rotor_resistance_std_percent: Percent
@@ -85,7 +100,7 @@ class _Acceptance(_File):
     strict: bool = False
 
 
-class ProcedureFile(_File):
+class ProcedureFile(FileTable):
     """`config/procedure.toml`."""
 
     axes: _Axes
@@ -171,26 +186,36 @@ def read_toml(path: Path) -> JsonObject:
         raise ConfigurationError(
             file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected=f"at most {MAX_BYTES} bytes"
         )
-    text = ""
+    held, text = path.read_bytes(), ""
     try:
-        text = path.read_text("utf-8-sig")
+        text = held.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
         if max(line.count(".") for line in text.split("\n")) > MAX_DOTS:
             raise ValueError(f"more than {MAX_DOTS} dots in a line")
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # syntax, encoding, digits without end, nesting without end
         raise ConfigurationError(
-            file=str(path), key="syntax", value=str(error), expected="valid TOML in UTF-8" + _decimal_comma(text)
+            file=str(path), key="syntax", value=str(error), expected="valid TOML in UTF-8" + _slip(held, text)
         ) from error
 
 
-def _decimal_comma(text: str) -> str:
-    """The first line whose number has a comma for its decimal point, and how TOML writes it; nothing where there is none."""
+def _slip(held: bytes, text: str) -> str:
+    """The first line that is no TOML for a reason that people have, and how TOML writes it; nothing where none is found."""
+    if held and not text:
+        kind = "is UTF-16, which Windows calls Unicode" if held.startswith(UTF_16) else "is in another encoding"
+        return f"; the file {kind}: save it as UTF-8"
     for number, line in enumerate(text.splitlines(), 1):
-        if found := DECIMAL_COMMA.fullmatch(line.strip()):
-            return (
-                f"; in line {number} a decimal comma stands where TOML has a point: {found[1]} = {found[2]}.{found[3]}"
-            )
+        for pattern, what, right in SLIPS:
+            if (found := pattern.fullmatch(line.strip())) and not _is_toml(line):
+                return f"; in line {number} {what}: {right.format(**found.groupdict())}"
     return ""
+
+
+def _is_toml(line: str) -> bool:
+    """`0x10` and `1e5` are numbers, not numbers with a unit behind."""
+    try:
+        return bool(tomllib.loads(line))
+    except ValueError:
+        return False
 
 
 def _resolve(name_or_path: str, folder: str) -> Path:

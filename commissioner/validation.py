@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
 UNITS = {
@@ -16,6 +16,22 @@ UNITS = {
     "degc": "degC", "percent": "%",
 }  # fmt: skip
 """By the end of a key: the unit its number is in."""
+
+
+class FileTable(BaseModel):
+    """A table of a file that a person writes: no key too many, and a truth is no number."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_as_number(cls, value: object, field: ValidationInfo) -> object:
+        """`pole_pairs = true` is not one pair, as Python counts it."""
+        if isinstance(value, bool) and cls.model_fields[str(field.field_name)].annotation is not bool:
+            raise ValueError(f"not {str(value).lower()}")
+        return value
+
+
 _WANTED = {
     "int": "a whole number",
     "float": "a number",

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -154,7 +155,11 @@ def identify(
         legs = with_known_law(free, [segments(f.stretches) for f in fits], legs, pairs)
     fits = [replace(f, batch=batch) for f, batch in zip(fits, legs, strict=True)]
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
-    shift = _time_shift(results, fits, late, period_s) if is_final else _as_fitted(results[0].batch, late, period_s)
+    shift = (
+        _time_shift([results[0].batch, free[0]], as_fitted[0], late, period_s)
+        if is_final
+        else _as_fitted(results[0].batch, late, period_s)
+    )
     require_near(shift)
     temperature = winding_temperature_degc or _temperature(recording)
     return replace(_summary(results, examined, plate, estimator, temperature, assumption, shift), fits=as_fitted)
@@ -200,22 +205,19 @@ def _as_fitted(batch: BatchFit, late: int, period_s: float) -> TimeShift:
     return TimeShift(late, late * period_s + batch.delay.value, batch.delay.std, period_s)
 
 
-def _time_shift(results: Sequence[AxisResult], fits: Sequence[AxisFit], late: int, period_s: float) -> TimeShift:
-    """How far the currents lie behind the voltage; where no fit asked for a delay, what a fit with one says of none."""
-    batch = results[0].batch
-    if not batch.model.with_delay:
+def _time_shift(from_any: Sequence[BatchFit], of_test: AxisFit, late: int, period_s: float) -> TimeShift:
+    """How far the currents lie behind the voltage; where no fit asked for a delay, what one with it says of none, begun at the first
+    of `from_any` that can be simulated: values that a common loss has moved are no fit's, and may run away."""
+    if from_any[0].model.with_delay:
+        return _as_fitted(from_any[0], late, period_s)
+    parts = segments(of_test.stretches)
+    for batch in from_any:
         with_delay = replace(batch.model, with_delay=True)
-        parts = segments(fits[0].stretches)
-        batch = fit_segments(
-            parts,
-            period_s,
-            batch.gamma.as_inverse_gamma(),
-            with_delay,
-            extended(batch, with_delay),
-            TRIAL_STEPS,
-            own_start=batch.own,
-        )
-    return _as_fitted(batch, late, period_s)
+        start, theta = batch.gamma.as_inverse_gamma(), extended(batch, with_delay)
+        with suppress(DataRefused):
+            trial = fit_segments(parts, period_s, start, with_delay, theta, TRIAL_STEPS, own_start=batch.own)
+            return _as_fitted(trial, late, period_s)
+    return _as_fitted(from_any[-1], late, period_s)
 
 
 def _temperature(recording: StandstillRecording) -> float | None:

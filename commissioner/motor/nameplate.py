@@ -192,6 +192,10 @@ def efficiency_range(power_w: float) -> tuple[float, float]:
     return LEAST_OF_TYPICAL * typical, min(LAST_DIGITS * (1.0 - LEAST_LOSS_OF_TYPICAL * (1.0 - typical)), 1.0)
 
 
+def _pairs(number: int) -> str:
+    return f"{number} pole pair{'' if number == 1 else 's'}"
+
+
 def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
     synchronous_rpm = 60.0 * plate.rated_frequency_hz / plate.pole_pairs
     most = LARGEST_SLIP_OF_MORE_W[1] if plate.rated_power_w > LARGEST_SLIP_OF_MORE_W[0] else LARGEST_SLIP
@@ -202,10 +206,10 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
         yield PlateProblem(
             "rated_speed_rpm",
             plate.rated_speed_rpm,
-            f"below the synchronous {synchronous_rpm:.0f} 1/min of {plate.pole_pairs} pole pairs at "
+            f"below the synchronous {synchronous_rpm:.0f} 1/min of {_pairs(plate.pole_pairs)} at "
             f"{plate.rated_frequency_hz:g} Hz by at most {most:.0%}: speed, frequency (50 or 60 Hz) and pole pairs of one line"
             + (
-                f" ({plate.rated_speed_rpm:g} 1/min at {plate.rated_frequency_hz:g} Hz is of {pairs} pole pairs)"
+                f" ({plate.rated_speed_rpm:g} 1/min at {plate.rated_frequency_hz:g} Hz is of {_pairs(pairs)})"
                 if fits
                 else ""
             ),

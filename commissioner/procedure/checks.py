@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
@@ -19,6 +20,15 @@ DC_LINK_RIPPLE = 0.02
 UNEVEN = 2.0
 """Of the fastest read of a window: a slower one is told."""
 REST_SPEED_RAD_PER_S = 0.5
+
+
+UNITS: Mapping[str, tuple[str, int]] = {
+    "DC link in range": ("V", 1), "heatsink temperature": ("°C", 0), "winding temperature": ("°C", 0),
+    "drive rated for the test current": ("A", 2), "rated power in the drive": ("W", 0), "rated voltage in the drive": ("V", 0),
+    "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
+    "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
+}  # fmt: skip
+"""Of what a check sees, by the check's plain name; and its decimals where a page shows it."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +68,19 @@ def check_failed(results: Sequence[CheckResult]) -> CheckFailed | None:
     if first is None:
         return None
     return CheckFailed(
-        f"check failed: {first.name}", step="check", value=first.value, limit=first.limit, remedy=first.remedy
-    )
+        f"check failed: {first.name}", step="check", value=first.value, limit=first.limit, remedy=first.remedy,
+        unit=check_unit(first.name),
+    )  # fmt: skip
+
+
+def check_name(check: str) -> str:
+    """`rated_power_w in the drive` -> `rated power in the drive`: no key, and no unit in the name."""
+    plain = re.sub(r", deg[A-Z]$", "", check)
+    return re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
+
+
+def check_unit(check: str) -> str:
+    return UNITS.get(check_name(check), ("", 0))[0]
 
 
 def judge_drive(
@@ -138,11 +159,13 @@ def _at_rest(statuses: Sequence[DriveStatus]) -> CheckResult:
 
 def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[CheckResult]:
     volts = [status.dc_link_v for status in statuses]
-    in_range = all(limits.dc_link_min_v <= v <= limits.dc_link_max_v for v in volts)
+    outside_v = [max(limits.dc_link_min_v - v, v - limits.dc_link_max_v, 0.0) for v in volts]
+    in_range = not any(outside > 0.0 or math.isnan(v) for outside, v in zip(outside_v, volts, strict=True))
+    shown_v = volts[-1] if in_range else volts[outside_v.index(max(outside_v))]
     yield CheckResult(
         "DC link in range",
         in_range,
-        round(volts[-1], 1),
+        round(shown_v, 1 if in_range else 3),
         f"{limits.dc_link_min_v:g} ... {limits.dc_link_max_v:g} V",
         "check the supply voltage and the pre-charge",
     )

@@ -33,6 +33,9 @@ UNSEEN = 3
 MOVES, LEAST_SHARE = 0.1, 0.1
 """A phase stands still that shows one and the same number while the voltage moves by this share of itself; a phase whose
 share of the axis current is smaller than the second is not asked."""
+STEPS = 2.0
+"""What a current that moves with its voltage must move by before a coarse converter shows it: of steps of 0.64 A a sound sensor showed one
+and the same beside a current of 0.7 A, and the run ended as a fault."""
 NAMES = ("u", "v", "w")
 CHECK = "check the current sensors, their plugs, order, sign and scale in the drive, and the motor cable"
 TURNING = "see that the shaft stands still, for one that turns makes currents beside the axis, too; "
@@ -117,14 +120,16 @@ def _smallest_step(seen: Signal, known_a: float) -> float:
 
 
 def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_a: float = 0.0) -> StopReason | None:
-    """Of one window, `(phases, n)` and `(n,)`: a phase that stands still though it should show more than one step, or the worst
-    one's rms distance from the axis' pattern."""
+    """Of one window, `(phases, n)` and `(n,)`: a phase that stands still though it should move by `STEPS` at least, or the worst one's
+    rms distance from the axis' pattern."""
     cosines = np.array(phase_cosines(axis_deg))[: seen.shape[0]]
     current = seen - zero.offset_a[:, None]
     along = cosines @ current / float(cosines @ cosines)
     size_a, noise_a = math.sqrt(float(np.mean(np.square(along)))), SIGMAS * float(np.max(zero.noise_a))
-    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & (size_a * np.abs(cosines) > step_a)
-    if still.any() and size_a > noise_a and np.ptp(voltage_v) > MOVES * np.max(np.abs(voltage_v)):
+    moves = float(np.ptp(voltage_v)) / max(peak(voltage_v), 1e-300)
+    expected_a = min(moves, 1.0) * size_a * np.abs(cosines)
+    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & (expected_a > STEPS * step_a)
+    if still.any() and size_a > noise_a and moves > MOVES:
         names = " and ".join(name for name, is_still in zip(NAMES, still, strict=False) if is_still)
         return _distrusted(
             f"the current sensor of phase {names} stands still", 0.0, "a current that moves with the voltage"

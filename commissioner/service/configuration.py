@@ -7,20 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.settings import load
+from commissioner.validation import FileTable
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,39}$")]
 Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class DriveTable(_Table):
+class DriveTable(FileTable):
     """One drive: how it is called, where it answers, which drive file describes it."""
 
     id: Identifier
@@ -29,7 +26,7 @@ class DriveTable(_Table):
     profile: Annotated[str, Field(min_length=1, max_length=200)] = "simulated"
 
 
-class SimulatorTable(_Table):
+class SimulatorTable(FileTable):
     """How `python -m sim` is started when somebody wants to try without a drive."""
 
     scenario: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,40}$")] = "default"
@@ -37,30 +34,30 @@ class SimulatorTable(_Table):
     seed: Annotated[int, Field(ge=0, le=2**31)] = 1
 
 
-class TlsTable(_Table):
+class TlsTable(FileTable):
     certificate: str
     key: str
 
 
-class ServiceTable(_Table):
+class ServiceTable(FileTable):
     runs: str = ""
     data: str = ""
-    names: list[Annotated[str, Field(max_length=253)]] = []
+    names: list[Annotated[str, Field(max_length=253)]] = Field(default=[])
     page_lost_s: Annotated[float, Field(ge=1, le=60)] = 5.0
     hand_over_s: Annotated[float, Field(ge=1, le=600)] = 15.0
     session_idle_s: Annotated[float, Field(ge=1, le=86400)] = 1800.0
     diagnosis: bool = True
-    axes_deg: list[Annotated[float, Field(ge=0, lt=360)]] = []
+    axes_deg: list[Annotated[float, Field(ge=0, lt=360)]] = Field(default=[])
     """Of runs from the page, in electrical degrees; none: the procedure's own."""
 
 
-class ServiceFile(_Table):
+class ServiceFile(FileTable):
     """The file of `serve --config`."""
 
     service: ServiceTable = ServiceTable()
     tls: TlsTable | None = None
     simulator: SimulatorTable = SimulatorTable()
-    drives: list[DriveTable] = []
+    drives: list[DriveTable] = Field(default=[])
 
 
 @dataclass(frozen=True)

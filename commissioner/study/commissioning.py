@@ -47,16 +47,16 @@ class NoArchive:
 
 def require_drawable(cases: Sequence[Case], file: Path) -> None:
     """ConfigurationError: what the study asks for can be drawn for none of its motors, as where an effect is misspelt."""
-    said = ""
+    said, asked = "", ""
     for case in {one.motor: one for one in reversed(cases) if one.kind == "commission"}.values():
         try:
             _drawn(case)
             return
         except ValueError as error:
-            said = str(error)
+            said, asked = str(error), ", ".join(sorted({*case.effects, *case.faults} - {"none"})) or case.motor
     if said:
         raise ConfigurationError(
-            file=str(file), key="motors, effects or faults", value=said, expected="what the simulator knows"
+            file=str(file), key="motors, effects or faults", value=asked, expected=f"what the simulator knows; {said}"
         )
 
 

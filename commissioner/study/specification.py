@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import Nameplate
 from commissioner.settings import is_plate, load_motor
+from commissioner.validation import FileTable
 
 MOST_CASES = 1_000_000
 
 
-class Specification(BaseModel):
+class Specification(FileTable):
     """`study FILE.toml`; keys and their meaning: contracts of the product, Campaigns."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: Literal["commission", "identify", "diagnose", "monitor"]
     runs: Annotated[int, Field(ge=1, le=MOST_CASES, description="number of commissionings, 1 ... 1e6")] = 1
@@ -29,7 +28,7 @@ class Specification(BaseModel):
     effects: list[str] | Literal["none", "any"] = "none"
     noise_a: Annotated[float, Field(ge=0, le=100, description="amperes rms, 0 ... 100")] | None = None
     links: Literal["memory", "tcp"] = "memory"
-    faults: list[str] = []
+    faults: list[str] = Field(default=[])
     axes_deg: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=12)] | None = (
         None
     )

@@ -94,8 +94,63 @@ def test_a_decimal_comma_is_told_with_its_line_and_the_point(tmp_path):
     number = PLATE.splitlines().index(current) + 1
     with pytest.raises(ConfigurationError) as caught:
         load_motor(_motor(tmp_path, PLATE.replace(current, "rated_current_a = 4,86  # A")))
-    assert f"in line {number} a decimal comma" in caught.value.limit
-    assert "rated_current_a = 4.86" in caught.value.limit
+    assert f"in line {number} a decimal comma" in caught.value.remedy
+    assert "rated_current_a = 4.86" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("key", "line", "what", "right"),
+    [
+        ("connection", "connection = star  # as wired", "without quotes", 'connection = "star"'),
+        ("connection", "connection = “star”", "typographic quotes", 'connection = "star"'),
+        ("rated_power_w", "rated_power_w = 2200 W", "a unit stands behind the number", "rated_power_w = 2200"),
+        ("rated_power_w", "rated_power_w = 2.2kW # plate", "a unit stands behind the number", "rated_power_w = 2.2"),
+        ("rated_power_w", "rated_power_w: 2200", "a colon stands where TOML has =", "rated_power_w = 2200"),
+        ("rated_power_w", "rated_power_w =", "nothing stands behind the =", "rated_power_w = ..."),
+    ],
+)
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+def test_a_line_that_people_write_in_place_of_toml_is_told_with_the_right_one(tmp_path, key, line, what, right, ends):
+    old = next(one for one in PLATE.splitlines() if one.startswith(key))
+    number = PLATE.splitlines().index(old) + 1
+    path = tmp_path / "motor.toml"
+    path.write_bytes(PLATE.replace(old, line).replace("\n", ends).encode())
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(str(path))
+    assert f"in line {number} " in caught.value.remedy
+    assert what in caught.value.remedy and caught.value.remedy.endswith(right)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "told"), [("utf-16", "UTF-16, which Windows calls Unicode"), ("cp1252", "in another encoding")]
+)
+def test_a_file_in_another_encoding_is_to_be_saved_as_utf_8(tmp_path, encoding, told):
+    path = tmp_path / "motor.toml"
+    path.write_text(PLATE.replace("[", "").replace("2.2 kW", "Lüfter"), encoding)
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(str(path))
+    assert f"the file is {told}: save it as UTF-8" in caught.value.remedy
+
+
+def test_a_number_that_only_looks_like_one_with_a_unit_is_not_blamed(tmp_path):
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(_motor(tmp_path, "rated_power_w = 2e3\npole_pairs = 0x2\nrated_current_a = 5 A\n"))
+    assert "in line 3 a unit stands behind the number: rated_current_a = 5" in caught.value.remedy
+
+
+def test_one_pole_pair_is_one(tmp_path):
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(_motor(tmp_path, PLATE.replace("pole_pairs = 2", "pole_pairs = 1")))
+    assert "3000 1/min of 1 pole pair at 50 Hz" in str(caught.value.limit)
+    assert "is of 2 pole pairs" in str(caught.value.limit)
+
+
+@pytest.mark.parametrize("key", ["pole_pairs", "rated_power_w", "inertia_kg_m2"])
+def test_true_is_no_number(tmp_path, key):
+    old = next(one for one in PLATE.splitlines() if one.startswith(key))
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(_motor(tmp_path, PLATE.replace(old, f"{key} = true")))
+    assert caught.value.key == key and "not true" in str(caught.value.limit)
 
 
 def test_broken_toml_and_missing_files_are_named(tmp_path):
@@ -161,7 +216,7 @@ def test_times_that_contradict_each_other_are_refused_with_both_keys(tmp_path, r
     assert (error.exit_code, error.step) == (2, "read configuration")
     assert (error.key, error.value, error.limit) == (key, value, limit)
     assert key in error.remedy
-    assert "limits.axis_time_s" in error.limit
+    assert "limits.axis_time_s" in error.remedy
 
 
 def test_a_run_may_be_as_long_as_its_one_test_and_a_test_just_longer_than_its_tones(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from types import TracebackType
 
 from rich.console import Console
@@ -11,6 +12,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from commissioner.cli.screens import screen
 from commissioner.procedure import findings as told
+from commissioner.report.sheet.words import check_words
 
 
 class LiveView:
@@ -107,7 +109,8 @@ class LiveView:
         failed = [result for result in record.results if not result.has_passed]
         self._line(f"    {len(record.results) - len(failed)} of {len(record.results)} checks passed")
         for result in failed:
-            self._line(f"    [red]✗ {escape(result.name)}: {result.value}, wanted {result.limit}[/]")
+            name, seen, wanted = check_words(asdict(result))
+            self._line(f"    [red]✗ {escape(f'{name}: {seen}, wanted {wanted}')}[/]")
 
     def _progress(self, record: told.EstimateUpdated) -> None:
         r_s, r_r, l_sigma, l_m = record.parameters

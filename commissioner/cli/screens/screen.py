@@ -82,19 +82,28 @@ def busy(doing: str) -> Iterator[None]:
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
     err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
-    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
+    remedy = once(error.remedy, error.limit)
+    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", remedy)):
         if fact not in (None, ""):
             err.print(f"  [dim]{name:<7}[/]{text(shown(fact, error.unit), SENTENCE)}")
 
 
 def once(remedy: str, limit: object) -> str:
-    """The remedy without the limit behind it, which stands in the line above: so archives of runs before November 2026 hold it."""
+    """The remedy without the limit behind it, which stands in the line above: a file's error says there what is expected."""
     return remedy.removesuffix(f": {limit}") if limit not in (None, "") else remedy
+
+
+_SIGNS = (
+    (r"\+-", "±"), (r"->", "→"), (r"\b([LT])_sigma\b", r"\1_σ"), (r"(\d) us\b", r"\1 µs"), (r"(\d) ohm\b", r"\1 Ω"),
+    (r"(\d) deg\b", r"\1°"),
+)  # fmt: skip
 
 
 def signs(sentence: str) -> str:
     """A document's sentence with the signs that the tables beside it have; a console that lacks them spells them out."""
-    return re.sub(r"(\d) us\b", r"\1 µs", sentence.replace("+-", "±"))
+    for spelt, sign in _SIGNS:
+        sentence = re.sub(spelt, sign, sentence)
+    return sentence
 
 
 def text(value: object, longest: int = LONGEST) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from commissioner.cli.screens import screen
 from commissioner.operations.check import Checked, CheckRequest
 from commissioner.operations.check import check as carry_out
@@ -23,16 +25,16 @@ def check(request: CheckRequest, *, as_json: bool) -> None:
 
 
 def _show(done: Checked) -> None:
+    from commissioner.report.sheet.words import check_words
+
     drive = done.drive
     firmware = f"firmware {drive.firmware_version}" if drive.firmware_version else "firmware unknown"
     screen.out.print(f"[bold]{screen.text(drive.words)}[/], {firmware}")
     rows = [
         (
             "[green]✓[/]" if r.has_passed else "[red]✗[/]",
-            r.name,
-            screen.shown(r.value),
-            screen.shown(r.limit),
-            "" if r.has_passed else r.remedy,
+            *map(screen.text, check_words(asdict(r))),
+            "" if r.has_passed else screen.text(r.remedy),
         )
         for r in done.checks
     ]

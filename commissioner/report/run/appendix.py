@@ -12,7 +12,7 @@ from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import digits, half_width, held, with_interval
-from commissioner.report.sheet.words import check_name, check_unit, seen_and_limit, spoken, typeset, with_symbols
+from commissioner.report.sheet.words import check_words, seen_and_limit, spoken, typeset, with_symbols
 
 _TOLD: Mapping[str, Callable[[Record], str]] = {
     "state_entered": lambda r: f"{r['state']}{_on_axis(r)}: {r['because']}",
@@ -114,16 +114,9 @@ def _check(row: Record) -> tuple[Text, ...]:
     good = bool(row["has_passed"])
     result = marks.judged("passed" if good else "failed", is_good=good)
     return (
-        check_name(str(row["name"])),
-        *_checked(row),
+        *map(with_symbols, check_words(row)),
         result if good else Markup("{} {}").format(result, row["remedy"]),
     )
-
-
-def _checked(row: Record) -> tuple[Text, Text]:
-    unit = check_unit(str(row["name"]))
-    seen, limit = seen_and_limit(row, unit)
-    return with_symbols(seen), with_symbols(limit.replace(" within", f" {unit}".rstrip() + " within"))
 
 
 def _event(line: Record) -> tuple[Text, ...]:
@@ -139,8 +132,9 @@ def _on_axis(record: Record) -> str:
     return f" at {axis:g}°" if axis is not None else ""
 
 
-def registers_and_record(subject: Subject) -> Markup:
-    """Appendix B."""
+def registers_and_record(subject: Subject, digest: str | None = None) -> Markup:
+    """Appendix B. `digest`: SHA-256 of result.json as it is now; a diagnosis after the run has written it anew since the folder was
+    closed."""
     files = subject.first("folder_closed").get("files") or {}
     here = [*["registers"] * bool(subject.written), *["record"] * bool(files), "procedure", "circuit"]
     parts = [Markup("<h2>B. {}</h2>").format(marks.capitalised(", ".join(here)))]
@@ -151,8 +145,9 @@ def registers_and_record(subject: Subject) -> Markup:
         )  # fmt: skip
         parts.append(marks.table(columns, _registers(subject)))
     if files:
+        now = {"result.json": digest} if digest else {}
         digests = [
-            (name, Markup('<span class="hash">{}</span>').format(facts["sha256"]))
+            (name, Markup('<span class="hash">{}</span>').format(now.get(name, facts["sha256"])))
             for name, facts in sorted(files.items())
             if name != "report.html"
         ]

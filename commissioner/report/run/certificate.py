@@ -10,13 +10,14 @@ from importlib.metadata import version
 from markupsafe import Markup
 
 from commissioner.motor.quantities import four_digits, plate_words
+from commissioner.procedure.checks import check_name, check_unit
 from commissioner.report.run.quantities import BY_FIELD, FOUR, QUANTITIES, Quantity
 from commissioner.report.run.standing import ACCEPTED
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import counted, digits, half_width, held, like, percent, signed, with_interval
-from commissioner.report.sheet.words import NBSP, check_name, check_unit, seen_and_limit, spoken, typeset
+from commissioner.report.sheet.words import NBSP, seen_and_limit, spoken, typeset
 
 _COLUMNS = (
     Column("Parameter"),

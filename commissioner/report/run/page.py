@@ -35,7 +35,7 @@ def run_page(
         Page("evidence", "Evidence", evidence(subject), flows=not subject.tests),
         Page("simulation", "Plain simulation", plain_simulation(subject)),
         Page("a", "A Checks", checks_and_course(subject), flows=True),
-        Page("b", "B Procedure", registers_and_record(subject), flows=True),
+        Page("b", "B Procedure", registers_and_record(subject, digest), flows=True),
         Page("c", "C Uncertainty", uncertainty(subject), flows=True),
         Page("d", "D The motor over the years", years_sheet(years), flows=True),
     ]

@@ -9,30 +9,14 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from commissioner.motor.quantities import FIVE
+from commissioner.procedure.checks import check_name, check_unit
 from commissioner.report.sheet.numbers import digits
 from commissioner.text import in_unit
 
 NBSP = "\u00a0"
-UNITS: Mapping[str, tuple[str, int]] = {
-    "DC link in range": ("V", 1), "heatsink temperature": ("°C", 0), "winding temperature": ("°C", 0),
-    "drive rated for the test current": ("A", 2), "rated power in the drive": ("W", 0), "rated voltage in the drive": ("V", 0),
-    "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
-    "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
-}  # fmt: skip
-"""Of what a check sees, by the check's plain name; and its decimals."""
 _SIGNS = (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ"), ("->", "→"))
 _MOST_DIGITS = 9
 UNIT_ENDINGS = ("_a_per_min", "_rad_per_s", "_ppm", "_us", "_ms", "_wb", "_nf", "_hz_a", "_v", "_a", "_s")
-
-
-def check_name(check: str) -> str:
-    """`rated_power_w in the drive` -> `rated power in the drive`: no key, and no unit in the name."""
-    plain = re.sub(r", deg[A-Z]$", "", check)
-    return re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-
-
-def check_unit(check: str) -> str:
-    return UNITS.get(check_name(check), ("", 0))[0]
 
 
 def typeset(text: str) -> str:
@@ -47,6 +31,15 @@ def with_symbols(text: str) -> Markup:
     """`L_M` as it is set; everything else escaped."""
     marked = re.sub(r"\b([RLT])_(sigma|σ|s|R|M|r)\b", r"\1<sub>\2</sub>", str(escape(text)))
     return Markup(marked.replace("<sub>sigma</sub>", "<sub>σ</sub>"))
+
+
+def check_words(check: Mapping[str, Any]) -> tuple[str, str, str]:
+    """A check's name, what it saw and what it wanted, each number in its unit: 479.8 V that failed are not the 480 V of the limit."""
+    unit = check_unit(str(check["name"]))
+    seen, limit = seen_and_limit(check, unit)
+    if not check["has_passed"] and isinstance(check["value"], float):
+        seen = in_unit(f"{check['value']:.{_MOST_DIGITS}g}", check["value"], unit)
+    return check_name(str(check["name"])), seen, limit.replace(" within", f" {unit}".rstrip() + " within")
 
 
 def spoken(text: str) -> Markup:

@@ -47,7 +47,8 @@ def must_be_archive(root: Path) -> None:
 
 
 def find_folder(root: Path, name: str) -> Path:
-    """As `find_run`, its folder. UsageError: none or several."""
+    """As `find_run`, its folder; also by the path that a shell completes, `runs/ID/`. UsageError: none or several."""
+    given, name = name, _id_of(root, name)
     names = sorted(os.listdir(root), reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
     if name == "last":
         matching = list(itertools.islice(filter(_is_run, (root / one for one in names)), 1))
@@ -60,14 +61,26 @@ def find_folder(root: Path, name: str) -> Path:
             remedy="give the folder of an archive with --runs, or make a run: `commissioner demo`",
         )  # fmt: skip
     if len(exact) != 1:
+        is_path = Path(name).name != name
         raise UsageError(
-            f"{len(exact)} runs match {name!r}",
+            f"{len(exact) or 'no'} runs match {given!r}",
             step="archive",
             value=", ".join(path.name for path in exact[:5]) or "none",
             limit="exactly one",
-            remedy=f"`commissioner runs list --runs {root}` shows the ids",
+            remedy=f"`commissioner runs list --runs {root}` shows the ids"
+            + (
+                "; of a run that lies elsewhere, give the id alone, and with --runs the folder around it"
+                if is_path
+                else ""
+            ),
         )
     return exact[0]
+
+
+def _id_of(root: Path, name: str) -> str:
+    """The folder's name alone, of a path into this archive; any other path is none of its runs, whatever lies there."""
+    path = Path(name)
+    return path.name if path.name != name and os.path.abspath(path.parent) == os.path.abspath(root) else name  # noqa: PTH100  touches no disk
 
 
 def _is_run(path: Path) -> bool:

@@ -10,8 +10,9 @@ from typing import Any
 from markupsafe import Markup
 
 from commissioner.motor.quantities import FIVE
+from commissioner.procedure.checks import UNITS, check_name
 from commissioner.report.sheet.marks import capitalised
-from commissioner.report.sheet.words import NBSP, UNITS, check_name, spoken
+from commissioner.report.sheet.words import NBSP, spoken
 from commissioner.service.page.texts import Texts
 
 SCRIPT_TEXTS = (

@@ -80,8 +80,13 @@ def test_a_configurations_error_says_each_thing_once(capsys):
     assert shown.count("1 or more") == 1 and shown.endswith("remedy correct pole_pairs in m.toml")
 
 
-def test_its_document_says_each_thing_once_too():
-    from commissioner.errors import ConfigurationError
+def test_a_sentence_has_the_signs_of_the_table_above_it():
+    from commissioner.cli.screens.screen import signs
 
-    error = ConfigurationError(file="m.toml", key="pole_pairs", value=0, expected="pole pairs: 1 or more").as_dict()
-    assert (error["limit"], error["remedy"]) == ("pole pairs: 1 or more", "correct pole_pairs in m.toml")
+    assert (
+        signs("6.04 s would narrow L_sigma 0.054 -> 0.051 %, at 60 deg")
+        == "6.04 s would narrow L_σ 0.054 → 0.051 %, at 60°"
+    )
+    assert signs("would have come out as 9.427 ohm instead of 3.728 ohm, R_s") == (
+        "would have come out as 9.427 Ω instead of 3.728 Ω, R_s"
+    )

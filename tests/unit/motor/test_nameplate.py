@@ -65,7 +65,7 @@ def test_an_impossible_plate_names_the_key(change, key):
 def test_a_speed_of_other_pole_pairs_says_of_which(pole_pairs, rpm, pairs):
     """3000, 1500, 1000, 750 1/min at 50 Hz; 1000 itself and 3600 are of none."""
     (problem,) = check(dataclasses.replace(PLATE, pole_pairs=pole_pairs, rated_speed_rpm=rpm))
-    assert (f"is of {pairs} pole pairs" if pairs else "pole pairs of one line") in problem.expected
+    assert (f"is of {pairs} pole pair{'s' * (pairs > 1)})" if pairs else "pole pairs of one line") in problem.expected
     assert ("1/min at 50 Hz is of" in problem.expected) == bool(pairs)
 
 

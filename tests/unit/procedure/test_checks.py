@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, judge_drive
+from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, check_failed, judge_drive
 from commissioner.procedure.link_plan import LinkPlan, StreamPace, plan_link
 from commissioner.records import DriveIdentity, DriveStatus
 
@@ -74,6 +74,17 @@ def test_a_shaft_that_moved_during_the_dwell_fails_even_if_it_rests_now():
 def test_a_link_that_is_still_charging_is_not_steady():
     assert _failed((replace(STATUS, dc_link_v=500.0), STATUS)) == ["DC link steady"]
     assert _failed((replace(STATUS, dc_link_v=470.0), replace(STATUS, dc_link_v=470.0))) == ["DC link in range"]
+
+
+def test_the_voltage_that_left_its_range_is_the_one_that_is_told_in_its_unit():
+    readings = (replace(STATUS, dc_link_v=470.0), replace(STATUS, dc_link_v=479.996), STATUS)
+    results = judge_drive(IDENTITY, readings, {}, PLATE, LIMITS, 6.4)
+    seen = {result.name: result.value for result in results}
+    assert seen["DC link in range"] == 470.0
+    error = check_failed(results)
+    assert error is not None and (error.value, error.unit) == (470.0, "V")
+    (just,) = [r for r in judge_drive(IDENTITY, readings[1:], {}, PLATE, LIMITS, 6.4) if r.name == "DC link in range"]
+    assert (just.has_passed, just.value) == (False, 479.996)
 
 
 def test_a_drive_too_small_for_the_test_current_fails():

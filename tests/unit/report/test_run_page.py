@@ -15,6 +15,7 @@ from commissioner.records import SampleBlock
 from commissioner.report.run.evidence import iron
 from commissioner.report.run.page import run_page
 from commissioner.report.run.subject import Subject
+from commissioner.report.sheet.words import check_words
 
 PLAN = {
     "axes_deg": [0.0, 60.0], "repeat_first": True, "supervision": {"watchdog_s": 0.5},
@@ -178,6 +179,25 @@ def test_a_check_has_no_key_and_a_unit_on_both_sides():
     for *_, told in checks:
         assert told in text
     assert "32.0 °C" in words(first_page(result(checks=rows))[0])
+
+
+def test_the_record_has_the_digest_of_the_result_as_it_is_and_not_as_it_was_before_the_diagnosis():
+    files = {"result.json": {"bytes": 2, "sha256": "01" * 32}, "request.json": {"bytes": 2, "sha256": "cd" * 32}}
+    text = words(run_page(result(), [*JOURNAL, line("folder_closed", {"files": files})], Findings(), {}, "ab" * 32))
+    assert f"result.json {'ab' * 32}" in text and f"request.json {'cd' * 32}" in text
+    assert "01" * 32 not in text
+
+
+@pytest.mark.parametrize(("passed", "told"), [(False, "479.8 V"), (True, "480 V")])
+def test_a_value_that_failed_is_never_rounded_into_its_limits(passed, told):
+    check = {
+        "name": "DC link in range",
+        "has_passed": passed,
+        "value": 479.8,
+        "limit": "480 ... 640 V",
+        "remedy": "wait",
+    }
+    assert check_words(check) == ("DC link in range", told, "480 ... 640 V")
 
 
 def test_what_the_estimator_says_is_set_with_symbols_and_no_parameters_key_reaches_the_page():

@@ -311,6 +311,20 @@ def test_an_index_with_another_table_is_made_anew(tmp_path, made):
     assert find_runs(RunFolders(tmp_path)).indexed == "index.sqlite"
 
 
+@pytest.mark.parametrize("form", ["{0}/{1}", "{0}/{1}/", "{0}/../{2}/{1}"])
+def test_a_run_is_found_by_the_path_that_a_shell_completes(tmp_path, form):
+    run = make_run(tmp_path, "20261128-225054-simulated-3d243a").name
+    assert find_run(tmp_path, form.format(tmp_path, run, tmp_path.name)).run == run
+
+
+def test_a_run_of_another_archive_is_not_this_ones_and_the_remedy_says_how(tmp_path):
+    run = make_run(tmp_path / "theirs", "20261128-225054-simulated-3d243a").name
+    (tmp_path / "ours").mkdir()
+    with pytest.raises(UsageError, match="no runs match") as caught:
+        find_run(tmp_path / "ours", str(tmp_path / "theirs" / run))
+    assert "with --runs the folder around it" in caught.value.remedy
+
+
 def test_words_that_are_no_text_find_nothing(tmp_path):
     """What a terminal of another encoding hands over."""
     make_run(tmp_path, "20260101-000000-simulated-abcdef")

@@ -197,14 +197,15 @@ def test_behind_a_coarse_converter_a_lie_larger_than_its_steps_is_seen(axis_deg)
     assert damped is not None
 
 
+@pytest.mark.parametrize(("volts", "moves"), [([10.0, 20.0], 0.5), ([-20.0, 20.0], 1.0)])
 @pytest.mark.parametrize("is_more", [False, True])
-def test_a_phase_may_stand_still_that_should_show_no_more_than_a_step(is_more):
-    """Phase u has all of the axis current: what it should show is the size of that, and the others half."""
+def test_a_phase_may_stand_still_that_should_move_by_no_more_than_two_steps(is_more, volts, moves):
+    """Phase u has all of the axis current, and moves by what the voltage does of itself, by its size at the most."""
     cosines = np.array(phase_cosines(0.0))
     seen = np.outer(cosines, [3.0, 3.0])
     size_a = math.sqrt(float(np.mean(np.square(cosines @ seen / float(cosines @ cosines))))) * abs(cosines[0])
-    step_a = math.nextafter(size_a, 0.0) if is_more else size_a
-    found = _misfit(seen, np.array([20.0, 30.0]), _Zero(np.zeros(3), np.zeros(3)), 0.0, step_a)
+    step_a = 0.5 * moves * size_a * (0.99 if is_more else 1.0)
+    found = _misfit(seen, np.array(volts), _Zero(np.zeros(3), np.zeros(3)), 0.0, step_a)
     assert (found is not None and "phase u stands still" in found.what) is is_more
 
 

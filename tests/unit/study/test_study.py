@@ -192,8 +192,10 @@ def test_a_name_that_the_simulator_does_not_know_ends_the_study_before_its_first
         tmp_path,
         f'kind = "commission"\nruns = 2\nmotors = ["motor_x"]\n{key}\n'.replace("motor_x", simulator().motors()[0]),
     )
-    with pytest.raises(ConfigurationError, match=says):
+    with pytest.raises(ConfigurationError) as caught:
         carry_out(StudyRequest(file, tmp_path / "out"))
+    assert str(caught.value.value) in key and says in str(caught.value.limit)
+    assert "..." not in str(caught.value.limit)  # every name it knows is told
     assert not (tmp_path / "out").exists()
 
 
