@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,9 +128,13 @@ MOST_BUSY = 160
 """Knots around all changes: a load that changes all the time has them wider apart (1200 took minutes)."""
 
 
-def knot_times(record: Record) -> Array:
-    """(windows, knots), denser where the current changes after the start; short rows are filled up far beyond the end."""
-    spans = [_changes(w, record.period_s) for w in record.windows]
+def knot_times(record: Record, also: Sequence[NDArray[np.bool_]] = ()) -> Array:
+    """(windows, knots), denser where the current changes after the start and at the samples `also` of each window; short rows are filled up
+    far beyond the end."""
+    busy = [w.state == BUSY for w in record.windows]
+    if also:
+        busy = [a | b for a, b in zip(busy, also, strict=True)]
+    spans = [_changes(w, mask, record.period_s) for w, mask in zip(record.windows, busy, strict=True)]
     apart = max(BUSY_S, sum(high - low for own in spans for low, high in own) / MOST_BUSY)
     rows = []
     for w, own in zip(record.windows, spans, strict=True):
@@ -140,11 +144,21 @@ def knot_times(record: Record) -> Array:
     return np.array([np.concatenate([r, r[-1] + 1e3 * (1.0 + np.arange(widest - r.size))]) for r in rows])
 
 
-def _changes(w: Window, period_s: float) -> list[tuple[float, float]]:
+def _changes(w: Window, is_busy: NDArray[np.bool_], period_s: float) -> list[tuple[float, float]]:
     """Begin and end of what is near a change, s."""
-    is_near = np.pad(maximum_filter1d(w.state == BUSY, 2 * round(AROUND_S / period_s) + 1, mode="constant"), 1)
+    is_near = np.pad(maximum_filter1d(is_busy, 2 * round(AROUND_S / period_s) + 1, mode="constant"), 1)
     begins, ends = (np.flatnonzero(np.diff(is_near.astype(int)) == sign) for sign in (1, -1))
     return [(float(w.time_s[b]), float(w.time_s[e - 1]) + period_s) for b, e in zip(begins, ends, strict=True)]
+
+
+def with_knots_at(record: Record, fit: Fit, also: Sequence[NDArray[np.bool_]]) -> tuple[Machine, tuple[Column, ...]]:
+    """The fitted machine with the same load told by denser knots at these samples of each window, and its columns."""
+    machine = fit.machine
+    times = knot_times(record, also)
+    knots = np.array([np.interp(t, *own) for t, *own in zip(times, machine.knot_times_s, machine.knots, strict=True)])
+    columns = tuple(c for c in fit.columns if c.kind != "k")
+    denser = replace(machine, knots=knots, knot_times_s=times)
+    return denser, (*columns, *_knots_of(record, denser))
 
 
 @dataclass(frozen=True)
@@ -319,10 +333,12 @@ def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots:
         out += [Column("x", j, k) for j in FIRST]
         if machine.has_shaft and not w.is_from_rest:
             out.append(Column("x", 8, k))
-    if knots:
-        for k, w in enumerate(record.windows):
-            out += [Column("k", j, k) for j, t in enumerate(machine.knot_times_s[k]) if t < w.time_s[-1] + CALM_S]
-    return tuple(out)
+    return (*out, *(_knots_of(record, machine) if knots else ()))
+
+
+def _knots_of(record: Record, machine: Machine) -> Iterator[Column]:
+    for k, w in enumerate(record.windows):
+        yield from (Column("k", j, k) for j, t in enumerate(machine.knot_times_s[k]) if t < w.time_s[-1] + CALM_S)
 
 
 class _Sensitivity:

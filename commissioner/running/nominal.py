@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import (
@@ -17,12 +18,16 @@ from commissioner.estimation.fit import (
     jacobian,
     plain_machine,
     refine,
+    residuals,
+    with_knots_at,
     with_noise_of,
 )
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import Record
+from commissioner.estimation.record import BLOCK_S, STATES, Record
 from commissioner.motor.nameplate import prior
 
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
 """A fit with unknown shaft grows with these: from all at once 20 of 60 ended in a wrong valley, so none of 60."""
 FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
@@ -37,6 +42,9 @@ LOAD_RIPPLE = ("load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_
 """Of a load, once and twice a turn; like friction it takes torque from a shaft that turns, and drives none that stands."""
 STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))
 """Factors on the plate's four, tried in turn until one leaves the valley where R_s is near zero."""
+LEFT_OVER, NOT_THE_LOAD, MOST_LOOKS = 5.0, 0.1, 2
+"""Standard deviations of a block's chi-square from which something is left in it; the share of that beyond which a load that changes there is
+no reason; looks at what is left (a kink shows beside the first of them)."""
 ASSUMED_RUN_UP_S = 0.3
 ASSUMED_SHARES = (1.0, 0.3, 0.1)
 """Of a motor whose start was not recorded: from a load as heavy as ten of its own rotors to the bare shaft. Between two of these the valley of
@@ -56,6 +64,8 @@ def nominal(problem: Problem) -> tuple[Problem, Fit]:
     record = problem.record
     fit = with_speed(problem) if record.has_speed else with_shaft(problem)
     problem, fit = weighted(problem, fit)
+    if not record.has_speed:
+        fit = _with_load_changes(problem, fit)
     four = prior(record.plate).typical.as_tuple()
     off = [abs(np.log(fit.machine.value(n) / v)) for n, v in zip(FOUR, four, strict=True)]
     if fit.chi2 / fit.count > LEAST_CHI2 * 100 or max(off) > np.log(30.0):
@@ -81,6 +91,42 @@ def weighted(problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
         if moved < STAYS:
             break
     return problem, fit
+
+
+def _with_load_changes(problem: Problem, fit: Fit) -> Fit:
+    """With knots of the load near each other where something is left after the run-up, if they explain it.
+
+    A step or a ramp that changes the current by less than `MOVES` in a block lies between knots 0.15 s apart: a healthy motor was
+    called unexplained. What such knots do not take away is no load.
+    """
+    block = max(round(BLOCK_S / problem.period), 8)
+    for _ in range(MOST_LOOKS):
+        windows = zip(problem.record.windows, residuals(problem, fit.machine), strict=True)
+        marks = [_left_over(rest, w.state, block) for w, rest in windows]
+        if not any(m.any() for m in marks):
+            break
+        denser = refine(problem, *with_knots_at(problem.record, fit, marks))
+        before, after = (_excess(problem, f, marks) for f in (fit, denser))
+        if after > NOT_THE_LOAD * before:
+            break
+        fit = denser
+    return fit
+
+
+def _left_over(rest: Array, state: NDArray[np.int64], block: int) -> Bools:
+    """Samples of the blocks after the run-up in which more is left than chance leaves."""
+    whole, width = rest.shape[0] // block, rest.shape[1]
+    square = np.mean(rest[: whole * block].reshape(whole, -1) ** 2, axis=1)
+    is_left = square > 1.0 + LEFT_OVER * np.sqrt(2.0 / (block * width))
+    samples = np.zeros(rest.shape[0], dtype=bool)
+    samples[: whole * block] = np.repeat(is_left, block)
+    return np.asarray(samples & (state != STATES.index("start")))
+
+
+def _excess(problem: Problem, fit: Fit, marks: Sequence[Bools]) -> float:
+    """Chi-square above the noise's at these samples."""
+    parts = [rest[m] for rest, m in zip(residuals(problem, fit.machine), marks, strict=True)]
+    return float(sum(np.sum(x**2) - x.size for x in parts))
 
 
 def with_speed(problem: Problem) -> Fit:
