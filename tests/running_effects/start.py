@@ -30,6 +30,7 @@ def started(
     has_shaft: bool = False,
     active: float = 0.0,
     later: float = 0.0,
+    unbalance: float = 0.008,
     **added: float,
 ) -> RunningRecording:
     """Run-up in 0.3 s and two load steps, on mains with unbalance and a fifth; noise of 0.3 %.
@@ -38,7 +39,7 @@ def started(
     """
     rng, t = np.random.default_rng(4), 0.5 * PERIOD * np.arange(2 * COUNT_SAMPLES - 1)
     turn = np.exp(1j * (100 * np.pi * t + 0.4))
-    u = 326.6 * (turn + 0.008 * np.conj(turn) + 0.01 * np.conj(turn) ** 5)
+    u = 326.6 * (turn + unbalance * np.conj(turn) + 0.01 * np.conj(turn) ** 5)
     slip = 0.01 + 0.99 / (1.0 + np.exp((t - 0.3) / 0.03)) + 0.02 * np.tanh((t - 0.8) / 0.01) + 0.01 * (t > 1.4)
     w = 100 * np.pi * (1.0 - np.clip(slip, 0.002, 1.0))
     p = np.zeros(COUNT)
