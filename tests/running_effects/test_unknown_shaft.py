@@ -1,4 +1,4 @@
-"""Healthy motors without a speed column: where their run-up ends, which valley a steady load's fit ends in, small steps of a load."""
+"""Where a run-up ends, which valley a steady load's fit ends in, small steps of a load: without a speed column, but for the last."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from commissioner.estimation.fit import problem_of
 from commissioner.estimation.record import STATES, prepare
 from commissioner.records import RunningRecording
+from commissioner.running.diagnosis import diagnose
 from commissioner.running.lack import lack_of_fit
 from commissioner.running.nominal import nominal
 from tests.running_effects.start import FOUR, PERIOD, PLATE, started
@@ -18,12 +19,13 @@ BURST = 0.2
 COVERED = 4.0
 
 
-def _running(first: int, last: int | None = None, **added: float) -> RunningRecording:
-    """Without a speed; cut from a start."""
+def _running(first: int, last: int | None = None, *, has_speed: bool = False, **added: float) -> RunningRecording:
+    """Cut from a start."""
     whole, part = started(PLATE, has_shaft=True, **added), slice(first, last)
     return replace(
-        whole, time_s=whole.time_s[part], speed_rad_per_s=None, currents_a=tuple(x[part] for x in whole.currents_a),
+        whole, time_s=whole.time_s[part], currents_a=tuple(x[part] for x in whole.currents_a),
         voltages_v=tuple(x[part] for x in whole.voltages_v),
+        speed_rad_per_s=whole.speed_rad_per_s[part] if has_speed else None,
     )  # fmt: skip
 
 
@@ -51,3 +53,20 @@ def test_a_load_step_that_hardly_changes_the_current_leaves_nothing(later: float
     problem, fit = nominal(problem_of(record, 0.0))
     assert lack_of_fit(problem, fit.machine).burst_sigma < BURST
     assert max(abs(fit.machine.value(n) - true) / fit.std(n) for n, true in FOUR.items()) < COVERED
+
+
+def test_a_shorted_turn_under_one_steady_load_is_named() -> None:
+    """The plain motor without it has an R_s of 1e-6 ohm once the noise is weighted: the recording was refused."""
+    size = 0.15
+    faulty = _running(
+        5000,
+        has_speed=True,
+        inertia=0.03,
+        load_constant=0.6,
+        unbalance=0.02,
+        loop_conductance_w=size,
+        loop_susceptance_w=0.3 * size,
+    )
+    found = diagnose([faulty], PLATE)
+    assert [(c.name, c.form) for c in found.causes] == [("stator_asymmetry", "phase w")]
+    assert found.causes[0].sizes["current_in_w_of_rated"][0] == pytest.approx(size * np.hypot(1.0, 0.3), rel=0.05)
