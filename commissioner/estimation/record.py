@@ -20,6 +20,12 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 STATES = ("off", "start", "steady", "transient", "coasting")
 """What a stretch of 20 ms is: no voltage and no current; speeding up; nothing changes; a load step or a ramp; current without voltage."""
+MOVES, FAST_UP, PAST_BREAKDOWN = 0.03, 2.0, 0.6
+"""Change of the mean current from one block to the next that is one; the current over the rated one of a shaft that is still far from its
+speed; the current a volt over its largest since closing of one that is past its breakdown torque. From there the run-up is over where
+nothing changes, and where more current flows a volt than a block before: a shaft that speeds up takes less and less. (A load that pulsates changes
+the current in every block: all of a recording was `start`, a load step in it had knots 0.15 s apart, and a healthy motor without a speed
+column was called unexplained.)"""
 STEADY_SHARE = 0.95
 """Of the samples of one steady load: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 BLOCK_S = 0.02
@@ -435,14 +441,17 @@ def _states(window: Window, scales: Scales, period: float) -> NDArray[np.int64]:
     volts = np.hypot(*window.voltage[::2].T)
     out = np.zeros(window.count, np.int64)
     means = [float(size[k : k + block].mean()) for k in range(0, window.count, block)]
+    fed = [float(volts[k : k + block].mean()) for k in range(0, window.count, block)]
+    a_volt = [mean / max(v, 1e-9) for mean, v in zip(means, fed, strict=True)]
     started = not window.is_from_rest
     for j, mean in enumerate(means):
         part = slice(j * block, (j + 1) * block)
         before, after = means[max(j - 1, 0)], means[min(j + 1, len(means) - 1)]
-        moves = max(abs(after - mean), abs(mean - before)) > 0.03 * max(mean, 0.2 * scales.current_a)
-        if volts[part].mean() < OFF_VOLTAGE * scales.voltage_v:
+        moves = max(abs(after - mean), abs(mean - before)) > MOVES * max(mean, 0.2 * scales.current_a)
+        slips = (1.0 + MOVES) * a_volt[max(j - 1, 0)] < a_volt[j] < PAST_BREAKDOWN * max(a_volt[: j + 1])
+        if fed[j] < OFF_VOLTAGE * scales.voltage_v:
             out[part] = STATES.index("coasting" if mean > OFF_CURRENT * scales.current_a else "off")
-        elif not started and (moves or mean > 2.0 * scales.current_a):
+        elif not started and (mean > FAST_UP * scales.current_a or (moves and not slips)):
             out[part] = STATES.index("start")
         else:
             started = True

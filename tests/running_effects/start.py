@@ -24,15 +24,22 @@ FOUR = {
 
 
 def started(
-    plate: Nameplate, *, voltage_noise_v: float = 0.5, has_shaft: bool = False, active: float = 0.0, **added: float
+    plate: Nameplate,
+    *,
+    voltage_noise_v: float = 0.5,
+    has_shaft: bool = False,
+    active: float = 0.0,
+    later: float = 0.0,
+    unbalance: float = 0.008,
+    **added: float,
 ) -> RunningRecording:
     """Run-up in 0.3 s and two load steps, on mains with unbalance and a fifth; noise of 0.3 %.
 
-    `has_shaft`: the speed is that of `inertia`, the loads in `added` and, also at rest, `active` of rated torque, without steps.
+    `has_shaft`: the speed is that of `inertia`, the loads in `added` and, also at rest, `active` of rated torque, with `later` more from 1.19 s on.
     """
     rng, t = np.random.default_rng(4), 0.5 * PERIOD * np.arange(2 * COUNT_SAMPLES - 1)
     turn = np.exp(1j * (100 * np.pi * t + 0.4))
-    u = 326.6 * (turn + 0.008 * np.conj(turn) + 0.01 * np.conj(turn) ** 5)
+    u = 326.6 * (turn + unbalance * np.conj(turn) + 0.01 * np.conj(turn) ** 5)
     slip = 0.01 + 0.99 / (1.0 + np.exp((t - 0.3) / 0.03)) + 0.02 * np.tanh((t - 0.8) / 0.01) + 0.01 * (t > 1.4)
     w = 100 * np.pi * (1.0 - np.clip(slip, 0.002, 1.0))
     p = np.zeros(COUNT)
@@ -41,7 +48,7 @@ def started(
     out, shaft = np.empty((COUNT_SAMPLES, 3)), np.empty((COUNT_SAMPLES, 2))
     march(
         p, scales_of(plate).as_tuple(), np.zeros(STATES), np.stack([u.real, u.imag], axis=1), np.stack([w, np.gradient(w, t)], axis=1),
-        np.full(2, active), np.zeros(t.size), PERIOD, has_shaft, out, shaft,
+        np.array([active, active + later]), (t > 1.19).astype(float), PERIOD, has_shaft, out, shaft,
     )  # fmt: skip
     w = np.repeat(shaft[:, 0], 2)[:-1] if has_shaft else w
     i, axes = out[:, 0] + 1j * out[:, 1], np.exp(-2j * np.pi * np.arange(3) / 3)
