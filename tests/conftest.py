@@ -59,8 +59,9 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
-PATIENT = ("integration/link/test_tune_verb.py", "integration/service/browser/test_tuning.py")
-"""Files of these that wait for a drive which tunes itself, seconds long: no clock judges them either."""
+PATIENT = ("integration/link/test_tune_verb.py",)
+"""Files of these that wait for a drive which tunes itself, seconds long: no clock judges them either. A browser's stay where no other
+test needs an event loop of its own."""
 TOGETHER = "integration/service"
 """Its files share a costly fixture of a whole session: a file's tests stay on one worker."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
