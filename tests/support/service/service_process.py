@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -74,6 +75,13 @@ class ServiceProcess:
         for pid in self._children("sim"):
             with suppress(ProcessLookupError):  # it was ending by itself
                 os.kill(pid, signal.SIGKILL)
+
+    def add_copy(self, run: str, name: str) -> None:
+        """A run of the archive once more under another name, there at once and whole: one that is still being copied looks like one that
+        somebody has just begun, and has the drive."""
+        aside = self.folder / "aside"
+        shutil.copytree(self.runs / run, aside)
+        aside.rename(self.runs / name)
 
     def page(self, path: str) -> str:
         """A page as a browser gets it that was never here before; the scripts' client stays without a session."""

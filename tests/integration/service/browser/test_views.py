@@ -20,7 +20,7 @@ def shelf(service, finished):
     """Runs to look at: one that is good, a later copy, one that was stopped, one whose name and origin are hostile."""
     copies = {"later": "20991231-235959-simulated", "evil": "20991231-235958-<img src=x onerror=window.hit=1>"}
     for name in copies.values():
-        shutil.copytree(service.runs / finished, service.runs / name)
+        service.add_copy(finished, name)
     request = service.runs / copies["evil"] / "request.json"
     told = json.loads(request.read_text("utf-8"))
     told["origin"] = {"person": EVIL, "by": EVIL, "drive": EVIL, "motor": EVIL}
