@@ -126,10 +126,10 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
     current = seen - zero.offset_a[:, None]
     along = cosines @ current / float(cosines @ cosines)
     size_a, noise_a = math.sqrt(float(np.mean(np.square(along)))), SIGMAS * float(np.max(zero.noise_a))
-    moves = float(np.ptp(voltage_v)) / max(peak(voltage_v), 1e-300)
-    expected_a = min(moves, 1.0) * size_a * np.abs(cosines)
-    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & (expected_a > STEPS * step_a)
-    if still.any() and size_a > noise_a and moves > MOVES:
+    top_v, moved_v = peak(voltage_v), float(np.ptp(voltage_v))
+    moves = min(moved_v, top_v) * size_a * np.abs(cosines) > STEPS * step_a * top_v
+    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & moves
+    if still.any() and size_a > noise_a and moved_v > MOVES * top_v:
         names = " and ".join(name for name, is_still in zip(NAMES, still, strict=False) if is_still)
         return _distrusted(
             f"the current sensor of phase {names} stands still", 0.0, "a current that moves with the voltage"

@@ -56,6 +56,8 @@ EXPLAINED = {
     ): "strict or not: four fields, four values, four limits",
     ("commissioner.safety.sensors", "+ floor_a -> abs(shown - claimed) <"): ROUNDED,
     ("commissioner.safety.sensors", "np.abs(cosines) > LEAST_SHARE -> np.abs(cosines) >= LEAST_SHARE"): ROUNDED,
+    ("commissioner.safety.sensors", "size_a > noise_a -> size_a >= noise_a"): ROUNDED,
+    ("commissioner.safety.sensors", "moved_v > MOVES * top_v -> moved_v >= MOVES * top_v"): ROUNDED,
     (
         "commissioner.safety.sensors",
         "-phases.sum(axis=0) -> phases.sum(axis=0)",

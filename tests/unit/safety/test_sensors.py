@@ -91,6 +91,15 @@ def test_two_phases_that_stand_still_are_both_named():
     assert "phase v and w stands still" in verdict(damage=damage).what
 
 
+def test_three_sensors_that_stand_still_are_seen_at_a_small_current():
+    """They agree with the axis, and no step has been seen of any."""
+
+    def damage(seen, start):
+        return np.outer([1.0, -0.5, -0.5], np.ones(seen.shape[1])) if start >= 250 else seen
+
+    assert "phase u and v and w stands still" in verdict(damage=damage, offset=(0.0, 0.0, 0.0), rest=250).what
+
+
 def test_a_phase_that_has_no_part_of_the_axis_may_stand_still():
     """At 90 degrees phase u carries nothing."""
     assert verdict(axis_deg=90.0, damage=of_phase(0, lambda i: np.full_like(i, 0.02))) is None
