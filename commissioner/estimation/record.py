@@ -443,12 +443,13 @@ def _states(window: Window, scales: Scales, period: float) -> NDArray[np.int64]:
     means = [float(size[k : k + block].mean()) for k in range(0, window.count, block)]
     fed = [float(volts[k : k + block].mean()) for k in range(0, window.count, block)]
     a_volt = [mean / max(v, 1e-9) for mean, v in zip(means, fed, strict=True)]
+    largest = np.maximum.accumulate(a_volt)
     started = not window.is_from_rest
     for j, mean in enumerate(means):
         part = slice(j * block, (j + 1) * block)
         before, after = means[max(j - 1, 0)], means[min(j + 1, len(means) - 1)]
         moves = max(abs(after - mean), abs(mean - before)) > MOVES * max(mean, 0.2 * scales.current_a)
-        slips = (1.0 + MOVES) * a_volt[max(j - 1, 0)] < a_volt[j] < PAST_BREAKDOWN * max(a_volt[: j + 1])
+        slips = (1.0 + MOVES) * a_volt[max(j - 1, 0)] < a_volt[j] < PAST_BREAKDOWN * largest[j]
         if fed[j] < OFF_VOLTAGE * scales.voltage_v:
             out[part] = STATES.index("coasting" if mean > OFF_CURRENT * scales.current_a else "off")
         elif not started and (mean > FAST_UP * scales.current_a or (moves and not slips)):

@@ -102,17 +102,17 @@ def _with_load_changes(problem: Problem, fit: Fit) -> Fit:
     A step or a ramp that changes the current by less than `MOVES` in a block lies between knots 0.15 s apart: a healthy motor was
     called unexplained. What such knots do not take away is no load.
     """
-    block = max(round(BLOCK_S / problem.period), 8)
+    record, block = problem.record, max(round(BLOCK_S / problem.period), 8)
+    left = residuals(problem, fit.machine)
     for _ in range(MOST_LOOKS):
-        windows = zip(problem.record.windows, residuals(problem, fit.machine), strict=True)
-        marks = [_left_over(rest, w.state, block) for w, rest in windows]
+        marks = [_left_over(rest, w.state, block) for w, rest in zip(record.windows, left, strict=True)]
         if not any(m.any() for m in marks):
             break
-        denser = refine(problem, *with_knots_at(problem.record, fit, marks))
-        before, after = (_excess(problem, f, marks) for f in (fit, denser))
-        if after > NOT_THE_LOAD * before:
+        denser = refine(problem, *with_knots_at(record, fit, marks))
+        left_then = residuals(problem, denser.machine)
+        if _excess(left_then, marks) > NOT_THE_LOAD * _excess(left, marks):
             break
-        fit = denser
+        fit, left = denser, left_then
     return fit
 
 
@@ -126,9 +126,9 @@ def _left_over(rest: Array, state: NDArray[np.int64], block: int) -> Bools:
     return np.asarray(samples & (state != STATES.index("start")))
 
 
-def _excess(problem: Problem, fit: Fit, marks: Sequence[Bools]) -> float:
+def _excess(left: Sequence[Array], marks: Sequence[Bools]) -> float:
     """Chi-square above the noise's at these samples."""
-    parts = [rest[m] for rest, m in zip(residuals(problem, fit.machine), marks, strict=True)]
+    parts = [rest[m] for rest, m in zip(left, marks, strict=True)]
     return float(sum(np.sum(x**2) - x.size for x in parts))
 
 

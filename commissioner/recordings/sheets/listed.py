@@ -13,13 +13,16 @@ from commissioner.recordings.reading.layout import split
 from commissioner.recordings.words import folded
 
 NAME, SYMBOL, UNIT, VALUE, ASIDE = "name", "symbol", "unit", "value", "aside"
+QUANTITIES = "parameter quantity name item variable measurand grosse messgrosse kenngrosse grandeur magnitud grandezza"
+UNITS = "unit units einheit einheiten unite unites unidad unidades unita"
+VALUES = "value values reading wert werte messwert valeur valeurs valor valore valori"
+"""What a column of each is called in a list as in a long table, without accents."""
 HEADS = {
-    NAME: "parameter parameters quantity name item description designation characteristic property variable measurand data "
-    "grosse messgrosse kenngrosse kennwert bezeichnung benennung merkmal angabe eigenschaft grandeur designation parametre caracteristique "
-    "magnitud parametro concepto caracteristica descripcion grandezza descrizione caratteristica",
+    NAME: f"{QUANTITIES} parameters description designation characteristic property data kennwert bezeichnung benennung merkmal angabe "
+    "eigenschaft parametre caracteristique parametro concepto caracteristica descripcion descrizione caratteristica",
     SYMBOL: "symbol sym formelzeichen zeichen kurzzeichen formelz symbole simbolo sigla abbreviation",
-    UNIT: "unit units einheit einheiten einh unite unites unidad unidades unita uom dimension",
-    VALUE: "value values wert werte messwert nennwert valeur valeurs valor valore valori measured reading betrag nominal rated result ergebnis",
+    UNIT: f"{UNITS} einh uom dimension",
+    VALUE: f"{VALUES} nennwert measured betrag nominal rated result ergebnis",
     ASIDE: "pos no nr n id row zeile remark remarks note notes comment bemerkung bemerkungen tolerance toleranz source quelle standard norm",
 }  # fmt: skip
 """What the columns are called, without accents."""

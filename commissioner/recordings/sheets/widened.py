@@ -16,85 +16,19 @@ from commissioner.recordings.names import key_of, meaning_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.sheets.listed import QUANTITIES, UNITS, VALUES
 from commissioner.recordings.units import unit_in
 from commissioner.recordings.words import translated
 
 CHANNEL = frozenset(
-    [
-        "channel",
-        "channelname",
-        "channelid",
-        "signal",
-        "signalname",
-        "variable",
-        "variablename",
-        "sensor",
-        "tag",
-        "tagname",
-        "name",
-        "measurement",
-        "measurand",
-        "quantity",
-        "parameter",
-        "metric",
-        "series",
-        "item",
-        "field",
-        "kanal",
-        "kanalname",
-        "messkanal",
-        "messgrosse",
-        "grosse",
-        "kenngrosse",
-        "voie",
-        "canal",
-        "canale",
-        "grandeur",
-        "magnitud",
-        "grandezza",
-        "segnale",
-        "senal",
-        "variabile",
-    ]
+    f"{QUANTITIES} channel channelname channelid signal signalname variablename sensor tag tagname measurement metric series field kanal "
+    "kanalname messkanal voie canal canale segnale senal variabile".split()
 )
-VALUE = frozenset(
-    [
-        "value",
-        "values",
-        "val",
-        "reading",
-        "data",
-        "y",
-        "wert",
-        "werte",
-        "messwert",
-        "valeur",
-        "valeurs",
-        "valor",
-        "valores",
-        "valore",
-        "valori",
-    ]
-)
-UNIT = frozenset(["unit", "units", "einheit", "einheiten", "unite", "unites", "unidad", "unidades", "unita"])
+VALUE = frozenset(f"{VALUES} valores val data y".split())
+UNIT = frozenset(UNITS.split())
 POINT = frozenset(
-    [
-        "point",
-        "row",
-        "sample",
-        "index",
-        "no",
-        "nr",
-        "punkt",
-        "messpunkt",
-        "zeile",
-        "test",
-        "versuch",
-        "prueba",
-        "essai",
-        "prova",
-    ]
-)
+    ("point", "row", "sample", "index", "no", "nr", "punkt", "messpunkt", "zeile", "test", "versuch", "prueba", "essai", "prova")
+)  # fmt: skip
 """What the columns are called, as `key_of` their names; the rows' key is a time, or a point's number."""
 MARKS = (";", "\t", ",")
 FEWEST_CELLS, MOST_CELLS = 3, 8
