@@ -175,7 +175,8 @@ def outcome(seed: int, plan: str = "", estimator: str = "pao") -> Outcome:
     return Outcome(label, 100.0 * (found / exact - 1.0), 100.0 * np.array(result.std) / exact, result)
 
 
-def main(draws: int = 40, first: int = 0, plan: str = "") -> None:
+def main(draws: int = 40, first: int = 0, plan: str = "") -> int:
+    """1 where a draw could not be measured, or a value is beyond both its target and three of its stated standard errors."""
     print("errors (stated standard errors) in %: R_s / R_R / L_sigma / L_M")
     rows: list[Outcome] = []
     for seed in range(first, first + draws):
@@ -191,6 +192,11 @@ def main(draws: int = 40, first: int = 0, plan: str = "") -> None:
         chosen = [r for r in rows if r.label.startswith(name)]
         if chosen:
             _summarise(name, np.array([r.error for r in chosen]), np.array([r.stated for r in chosen]))
+    return int(len(rows) < draws or any(_is_beyond(row) for row in rows))
+
+
+def _is_beyond(row: Outcome) -> bool:
+    return bool(np.any(np.abs(row.error) > np.maximum(TARGET_PERCENT, 3.0 * np.asarray(row.stated))))
 
 
 def _summarise(name: str, errors: np.ndarray, stated: np.ndarray) -> None:
@@ -203,4 +209,4 @@ def _summarise(name: str, errors: np.ndarray, stated: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(a) for a in sys.argv[1:3]), *sys.argv[3:4])
+    raise SystemExit(main(*(int(a) for a in sys.argv[1:3]), *sys.argv[3:4]))
