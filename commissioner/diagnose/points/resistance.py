@@ -208,14 +208,27 @@ def _ask(
     )
 
 
+HOW_TO_TELL = (
+    "check where the resistance was measured (resistance_measured: line_to_line, phase_winding or star_equivalent), its "
+    "unit, and that power_w is of all three phases"
+)
+
+
 def _impossible(
     name: str, ohm: Array, measured_ohm: Array, readings: list[tuple[str, float]], *, is_locked: bool
 ) -> DataRefused:
+    factor, row = min(f for _, f in readings), int(np.argmin(measured_ohm - ohm))
+    if factor * ohm[row] >= measured_ohm[row]:
+        return refused(
+            f"{name} makes more copper loss than the whole power of the point whose P / (3 I^2) is {measured_ohm[row]:.4g} ohm",
+            f"{factor * float(ohm[row]):.4g} ohm per star phase",
+            f"below {measured_ohm[row]:.4g} ohm",
+            HOW_TO_TELL,
+        )
     return refused(
         f"{name} does not fit the points, whose P / (3 I^2) is {float(np.median(measured_ohm)):.4g} ohm",
         "; ".join(_left(kind, f, ohm, measured_ohm, is_locked=is_locked) for kind, f in dict(readings).items()),
         f"a rotor resistance of {ROTOR_OVER_STATOR[0]:g} to {ROTOR_OVER_STATOR[1]:g} times the stator's, as the plate's slip "
         "allows" if is_locked else "less copper loss than power",
-        "check where the resistance was measured (resistance_measured: line_to_line, phase_winding or star_equivalent), its "
-        "unit, and that power_w is of all three phases",
+        HOW_TO_TELL,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.resistance import column_of, star_resistance, unread
 from commissioner.errors import DataRefused
-from commissioner.records import POINT_COLUMNS, POINT_FORMS
+from commissioner.records import IDLE_TEST, LOCKED_TEST, POINT_COLUMNS, POINT_FORMS
 
 LEAST_POINTS, MOST_POINTS = 5, 300
 LEAST_SPREAD, LEAST_FLUX_SPREAD = 1.3, 1.15
@@ -72,7 +72,7 @@ def read_points(
     _, first = np.unique(rows, axis=0, return_index=True)
     copies, rows = rows.shape[0] - first.size, rows[np.sort(first)]
     f, v, i, p = rows[:, :4].T
-    is_locked = _is_locked(f, v, i, p, name)
+    is_locked = _is_locked(f, v, i, p, name, np.unique(columns.get("test", np.nan)))
     if (refusal := _not_usable(f, v, i, p, is_locked=is_locked)) is not None:
         return refusal
     remarks = [f"{copies} rows are copies of others: each was taken once."] if copies else []
@@ -148,7 +148,10 @@ def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> D
     return None
 
 
-def _is_locked(f: Array, v: Array, i: Array, p: Array, name: str) -> bool:
+def _is_locked(f: Array, v: Array, i: Array, p: Array, name: str, said: Array) -> bool:
+    """As every row is called (`said`), else as the table is, else by its points."""
+    if said.size == 1 and said[0] in (IDLE_TEST, LOCKED_TEST):
+        return bool(said[0] == LOCKED_TEST)
     lowered = name.lower().replace("-", "_").replace(" ", "_")
     if "no_load" in lowered or "noload" in lowered:
         return False

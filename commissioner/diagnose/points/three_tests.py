@@ -11,23 +11,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
-from commissioner.diagnose.points.meters import is_direct
 from commissioner.diagnose.points.resistance import column_of, star_resistance, unread
-from commissioner.diagnose.points.table import LEAST_POINTS, lacking
+from commissioner.diagnose.points.rows import (
+    IDLE_POWER_FACTOR,
+    LEAST_COLUMNS,
+    Rows,
+    called_otherwise,
+    joined,
+    looks_idle,
+    of_direct_current,
+    pooled,
+)
+from commissioner.diagnose.points.table import lacking
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.running import TCircuit
-from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, POINT_COLUMNS
+from commissioner.records import IDLE_TEST, POINT_COLUMNS
 
-APART = 3.0
-"""Least ratio of the inductances of no load and locked rotor: L_s over L_sigma is 5 to 30 of built motors."""
-IDLE_POWER_FACTOR = 0.6
-"""At most, of a motor without load; one with load has more."""
 SPLIT = {"A": 1.0, "B": 0.67, "C": 0.43, "D": 1.0, "N": 1.0}
 """X_1 over X_2 by design class (IEEE 112-2017, table 5; IEC's N as A)."""
 LOW_FREQUENCY = 0.25
@@ -57,69 +61,19 @@ class ThreeTests:
     rows: Mapping[str, int]
 
 
-LEAST_COLUMNS = POINT_COLUMNS[1:3]
-"""Of every table: a test with direct current has no frequency, and needs no power."""
-COLUMNS = ("frequency_hz", "voltage_v", "current_a", "power_w", "said")
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Points of one test, `(n,)` each."""
-
-    frequency_hz: Array
-    voltage_v: Array
-    current_a: Array
-    power_w: Array
-    said: Array
-    """`records.DIRECT_TEST` and its like where the sheet names the test, else not a number."""
-
-    @property
-    def resistance_ohm(self) -> Array:
-        return np.asarray(self.power_w / (3.0 * self.current_a**2))
-
-    @property
-    def impedance_ohm(self) -> Array:
-        return np.asarray(self.voltage_v / np.sqrt(3.0) / self.current_a)
-
-    @property
-    def reactance_ohm(self) -> Array:
-        return np.asarray(np.sqrt(np.maximum(self.impedance_ohm**2 - self.resistance_ohm**2, 0.0)))
-
-    @property
-    def inductance_h(self) -> Array:
-        return np.asarray(self.reactance_ohm / (2.0 * np.pi * self.frequency_hz))
-
-    def at(self, keep: NDArray[np.bool_]) -> _Rows:
-        return _Rows(*(getattr(self, name)[keep] for name in COLUMNS))
-
-
-def are_three_tests(tables: Sequence[Mapping[str, Array]]) -> bool:
-    """Whether the tables are tests of a motor together: a row of direct current, or two tests of which one has few points."""
-    if any(lacking(t, LEAST_COLUMNS) for t in tables):
-        return False
-    every = [_pooled(t) for t in tables]
-    if any(np.any(_is_direct(rows)) for rows in every):
-        return True
-    ac = _join(every)
-    few = any(rows.frequency_hz.size < LEAST_POINTS for rows in every)
-    if few and {IDLE_TEST, LOCKED_TEST} <= set(ac.said.tolist()):
-        return True
-    return few and ac.frequency_hz.size > 1 and bool(np.ptp(np.log(np.maximum(ac.inductance_h, 1e-12))) > np.log(APART))
-
-
 def solve(
     tables: Sequence[Mapping[str, Array]], metadata: Sequence[Mapping[str, float | str]]
 ) -> ThreeTests | DataRefused:
     """The circuit, or which test is missing or impossible."""
     if lacks := next((r for t in tables if (r := lacking(t, LEAST_COLUMNS)) is not None), None):
         return lacks
-    rows = _join([_pooled(t) for t in tables])
+    rows = joined([pooled(t) for t in tables])
     said = {k: v for one in reversed(metadata) for k, v in one.items()}
-    direct = _is_direct(rows)
+    direct = of_direct_current(rows)
     ac = rows.at(~direct)
     if (wrong := _wrong_cell(ac)) is not None:
         return wrong
-    if (against := _called_otherwise(ac)) is not None:
+    if (against := called_otherwise(ac, looks_idle(ac))) is not None:
         return against
     idle, locked, assumed = _by_kind(ac)
     if not idle.frequency_hz.size or not locked.frequency_hz.size:
@@ -128,7 +82,7 @@ def solve(
             f"these tests hold no pair of {kind} points", f"{ac.frequency_hz.size} points", "one of each at least",
             "give a point of either test in one table, or both tables together",
         )  # fmt: skip
-    stator = _stator(rows.at(direct), tables, said, locked)
+    stator = stator_resistance(rows.at(direct), tables, said, locked)
     if isinstance(stator, DataRefused):
         return stator
     r_s, where = stator
@@ -136,7 +90,7 @@ def solve(
 
 
 def _circuit(
-    r_s: float, idle: _Rows, locked: _Rows, said: Mapping[str, float | str], assumed: tuple[str, ...], direct: int
+    r_s: float, idle: Rows, locked: Rows, said: Mapping[str, float | str], assumed: tuple[str, ...], direct: int
 ) -> ThreeTests | DataRefused:
     best = _nearest(idle.voltage_v, said.get("rated_voltage_v"), float(idle.voltage_v.max()))
     l_s = float(idle.inductance_h[best])
@@ -169,23 +123,7 @@ def _circuit(
     )  # fmt: skip
 
 
-def _pooled(table: Mapping[str, Array]) -> _Rows:
-    """The rows of a table that has `LEAST_COLUMNS`; what else it lacks is not a number."""
-    size = table[LEAST_COLUMNS[0]].size
-    nothing = np.full(size, np.nan)
-    return _Rows(*(np.asarray(table.get(c, nothing), dtype=float) for c in (*POINT_COLUMNS, "test")))
-
-
-def _join(every: Sequence[_Rows]) -> _Rows:
-    return _Rows(*(np.concatenate([getattr(r, name) for r in every]) for name in COLUMNS))
-
-
-def _is_direct(rows: _Rows) -> NDArray[np.bool_]:
-    """A row without frequency is of direct current, unless it is called otherwise."""
-    return np.asarray(is_direct(rows.frequency_hz, rows.said) & (rows.voltage_v > 0.0) & (rows.current_a > 0.0))
-
-
-def _wrong_cell(ac: _Rows) -> DataRefused | None:
+def _wrong_cell(ac: Rows) -> DataRefused | None:
     for name, values in zip(POINT_COLUMNS, (ac.frequency_hz, ac.voltage_v, ac.current_a, ac.power_w), strict=True):
         wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
         if wrong.size and not np.isfinite(values).any():
@@ -208,47 +146,9 @@ def _wrong_cell(ac: _Rows) -> DataRefused | None:
     return None
 
 
-def _looks_idle(ac: _Rows) -> NDArray[np.bool_] | None:
-    """By the inductance of each row; None where all are of one kind."""
-    inductance = np.maximum(ac.inductance_h, 1e-12)
-    if not inductance.size or inductance.max() < APART * inductance.min():
-        return None
-    return np.asarray(inductance > np.sqrt(inductance.max() * inductance.min()))
-
-
-CALLED = {DIRECT_TEST: "direct current", IDLE_TEST: "no load", LOCKED_TEST: "locked rotor"}
-
-
-def _called_otherwise(ac: _Rows) -> DataRefused | None:
-    """A row whose test, as the sheet calls it, is not what its values are."""
-    if (wrong := np.flatnonzero(ac.said == DIRECT_TEST)).size:
-        hz = float(ac.frequency_hz[wrong[0]])
-        return refused(
-            f"a row is called direct current and has a frequency of {hz:g} Hz", hz, "no frequency, or 0",
-            "correct the frequency or the test's name",
-        )  # fmt: skip
-    looks = _looks_idle(ac)
-    against = (
-        np.flatnonzero(np.isfinite(ac.said) & ((ac.said == IDLE_TEST) != looks))
-        if looks is not None
-        else np.array([], dtype=int)
-    )
-    if not against.size:
-        return None
-    k = int(against[0])
-    name, other = (
-        CALLED[c] for c in ((IDLE_TEST, LOCKED_TEST) if ac.said[k] == IDLE_TEST else (LOCKED_TEST, IDLE_TEST))
-    )
-    return refused(
-        f"the row with {ac.voltage_v[k]:g} V and {ac.current_a[k]:g} A is called {name} and is {other} by its inductance",
-        f"{1e3 * ac.inductance_h[k]:.4g} mH, the rows hold {1e3 * ac.inductance_h.min():.4g} to {1e3 * ac.inductance_h.max():.4g} mH",
-        "a larger inductance at no load than with a locked rotor", "correct the test's name or the values",
-    )  # fmt: skip
-
-
-def _by_kind(ac: _Rows) -> tuple[_Rows, _Rows, tuple[str, ...]]:
+def _by_kind(ac: Rows) -> tuple[Rows, Rows, tuple[str, ...]]:
     """No-load points, locked-rotor points, and what was left out: inductances lie in two groups."""
-    is_idle = _looks_idle(ac)
+    is_idle = looks_idle(ac)
     if is_idle is None:
         named = np.isfinite(ac.said)
         is_idle, ac = (ac.said == IDLE_TEST)[named], ac.at(named)
@@ -259,8 +159,8 @@ def _by_kind(ac: _Rows) -> tuple[_Rows, _Rows, tuple[str, ...]]:
     return ac.at(is_idle & ~loaded), ac.at(~is_idle), said
 
 
-def _stator(
-    direct: _Rows, tables: Sequence[Mapping[str, Array]], said: Mapping[str, float | str], locked: _Rows
+def stator_resistance(
+    direct: Rows, tables: Sequence[Mapping[str, Array]], said: Mapping[str, float | str], locked: Rows
 ) -> tuple[float, str] | DataRefused:
     """R_s per star phase: half of U / I between two terminals, or what a column or key says."""
     if direct.voltage_v.size:
@@ -322,7 +222,7 @@ def _t_circuit(circuit: InverseGamma, ratio: float) -> TCircuit:
     )  # fmt: skip
 
 
-def _textbook(r_s: float, idle: _Rows, best: int, test: _Rows, at: int, ratio: float) -> dict[str, float]:
+def _textbook(r_s: float, idle: Rows, best: int, test: Rows, at: int, ratio: float) -> dict[str, float]:
     """The magnetizing branch of the locked test and the resistance of the idle one neglected."""
     x = float(test.reactance_ohm[at] * idle.frequency_hz[best] / test.frequency_hz[at])
     x_1 = x * ratio / (1.0 + ratio)
@@ -342,7 +242,7 @@ def _split(said: Mapping[str, float | str]) -> tuple[float, str]:
     )
 
 
-def _losses(idle: _Rows, r_s: float, best: int) -> tuple[Losses, str]:
+def _losses(idle: Rows, r_s: float, best: int) -> tuple[Losses, str]:
     beyond = idle.power_w - 3.0 * idle.current_a**2 * r_s
     together = float(beyond[best])
     same = idle.frequency_hz == idle.frequency_hz[best]
@@ -362,7 +262,7 @@ def _losses(idle: _Rows, r_s: float, best: int) -> tuple[Losses, str]:
     )
 
 
-def _slow(locked: _Rows, r_s: float) -> SlowRotor | None:
+def _slow(locked: Rows, r_s: float) -> SlowRotor | None:
     if np.unique(locked.frequency_hz).size < 2:
         return None
     return slow_rotor(

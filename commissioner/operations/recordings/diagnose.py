@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,7 +16,8 @@ from commissioner.diagnose.document import as_document, points_document, refused
 from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
-from commissioner.diagnose.points.table import read_points
+from commissioner.diagnose.points.rows import LEAST_COLUMNS
+from commissioner.diagnose.points.table import LEAST_POINTS, read_points
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
@@ -36,7 +37,10 @@ from commissioner.operations.recordings.running import diagnosed
 from commissioner.operations.recordings.sheets import (
     are_sheets,
     are_three,
+    by_test,
+    direct_current,
     notes_of,
+    of_circuit,
     require_whole_sheets,
     with_line_values,
 )
@@ -187,30 +191,41 @@ def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, t
 
 
 def _points(tables: Sequence[Table], request: DiagnoseRequest) -> Diagnosed:
-    """The stator resistance of a locked-rotor table serves the others; a few rows of different tests make one circuit."""
-    out = request.out
+    """The circuit that a few rows of different tests make, and a document for each test with rows enough of its own."""
+    out, given, tables = request.out, tables[0], by_test(tables)
     if are_three(tables):
+        enough = [t for t in tables if t.columns[LEAST_COLUMNS[0]].size >= LEAST_POINTS]
         one = of_three_tests(tables, request.motor, trust_from(request.trust))
-        if out is not None:
-            _write_points(out, one, [one], _names(tables)[:1])
-        return Diagnosed(one, out)
-    plate = plate_metadata(request.motor)
-    read = [read_points(t.columns, Path(t.source).stem, {**t.metadata, **plate}) for t in tables]
-    known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
-    resistance_ohm = float(known[0]) if known else None
-    documents = [
-        refused_document(points, "points")
-        if isinstance(points, DataRefused)
-        else points_document(analyse_points(points, resistance_ohm))
-        for points in read
-    ]
-    for table, one in zip(tables, documents, strict=True):
-        one["remarks"] = [*notes_of([table]), *one.get("remarks", [])]
-    names = _names(tables)
+        ohm = one["parameters_after"]["stator_resistance_ohm"]["value"]
+        own = [(t, d) for t, d in _series(enough, ohm, (), request.motor) if d["verdict"] != "refused"]
+        every = [(replace(given, source="circuit"), of_circuit(one)), *own] if own else [(given, one)]
+    else:
+        every = _series(*direct_current(tables, request.motor), request.motor)
+    documents = [document for _, document in every]
+    names = _names([table for table, _ in every])
     document = documents[0] if len(documents) == 1 else _joined(documents, names)
     if out is not None:
         _write_points(out, document, documents, names)
     return Diagnosed(document, out)
+
+
+def _series(
+    tables: Sequence[Table], ohm: float | None, how: Sequence[str], motor: str | None
+) -> list[tuple[Table, DiagnosisDocument]]:
+    """What each table of one test says. `ohm`: the stator's resistance where it is known, else that of a locked-rotor table serves all."""
+    plate = plate_metadata(motor)
+    read = [read_points(t.columns, Path(t.source).stem, {**t.metadata, **plate}) for t in tables]
+    known = [float(p.resistance_ohm.mean()) for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
+    ohm = next(iter(known), None) if ohm is None else ohm
+    documents = [
+        refused_document(points, "points")
+        if isinstance(points, DataRefused)
+        else points_document(analyse_points(points, ohm))
+        for points in read
+    ]
+    for table, one in zip(tables, documents, strict=True):
+        one["remarks"] = [*notes_of([table]), *how, *one.get("remarks", [])]
+    return list(zip(tables, documents, strict=True))
 
 
 def _write_points(

@@ -7,8 +7,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from commissioner.diagnose.contract import CONVENTION, DiagnosisDocument
 from commissioner.diagnose.points.meters import line_values
+from commissioner.diagnose.points.rows import CALLED, LEAST_COLUMNS
 from commissioner.diagnose.points.table import is_points_table
 from commissioner.errors import DataRefused
 from commissioner.identify.contract import Measured, ThreeTestsDocument
@@ -62,9 +65,70 @@ def require_whole_sheets(tables: Sequence[Table]) -> None:
             )  # fmt: skip
 
 
+def by_test(tables: Sequence[Table]) -> list[Table]:
+    """The tables of test points, one for each test whose rows a table holds."""
+    from commissioner.diagnose.points.rows import apart
+
+    return [
+        part
+        for t in tables
+        for part in (_apart(t, apart(t.columns)) if all(c in t.columns for c in LEAST_COLUMNS) else [t])
+    ]
+
+
+def _apart(table: Table, tests: Sequence[tuple[float, Any]]) -> list[Table]:
+    if len(tests) < 2:
+        return [table]
+    path, size = Path(table.source), tests[0][1].size
+    left = size - sum(int(rows.sum()) for _, rows in tests)
+    note = (
+        (ReadingNote("unknown_test", f"{left} rows of no known test or of a loaded motor were not used"),)
+        if left
+        else ()
+    )
+    return [
+        replace(
+            table,
+            source=str(path.with_name(f"{path.stem}_{CALLED.get(test, 'rest').replace(' ', '_')}{path.suffix}")),
+            columns={name: values[rows] for name, values in table.columns.items()} | _named(test, int(rows.sum())),
+            notes=(*table.notes, *note),
+        )
+        for test, rows in tests
+    ]
+
+
+def _named(test: float, size: int) -> dict[str, Any]:
+    return {"test": np.full(size, test)} if np.isfinite(test) else {}
+
+
+def direct_current(tables: Sequence[Table], motor: str | None) -> tuple[list[Table], float | None, tuple[str, ...]]:
+    """The tables (`by_test`) of alternating current, the resistance that those of direct current tell (None: there are none), and how it
+    was taken. DataRefused: a row is called by another test's name, or the direct current is ambiguous."""
+    from commissioner.diagnose.points.rows import joined, misnamed, of_direct_current, pooled
+    from commissioner.diagnose.points.three_tests import stator_resistance
+
+    if any(c not in t.columns for t in tables for c in LEAST_COLUMNS):
+        return list(tables), None, ()
+    if (wrong := misnamed([t.columns for t in tables])) is not None:
+        raise wrong
+    of_direct = [bool(np.all(of_direct_current(pooled(t.columns)))) for t in tables]
+    if not any(of_direct):
+        return list(tables), None, ()
+    direct, rest = (
+        [t for t, is_dc in zip(tables, of_direct, strict=True) if is_dc is wanted] for wanted in (True, False)
+    )
+    said = {**{k: v for t in reversed(tables) for k, v in t.metadata.items()}, **plate_metadata(motor)}
+    found = stator_resistance(
+        joined([pooled(t.columns) for t in direct]), [], said, joined([pooled(t.columns) for t in rest])
+    )
+    if isinstance(found, DataRefused):
+        raise found
+    return rest, found[0], (found[1],)
+
+
 def are_three(tables: Sequence[Table]) -> bool:
     """Whether they are the few rows of different tests that make a circuit together."""
-    from commissioner.diagnose.points.three_tests import are_three_tests
+    from commissioner.diagnose.points.rows import are_three_tests
 
     return are_three_tests([t.columns for t in tables])
 
@@ -103,6 +167,14 @@ def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) 
         "rows": dict(found.rows),
         "remarks": [*decided, *found.assumed, *notes_of(tables)],
     }
+
+
+def of_circuit(document: DiagnosisDocument) -> DiagnosisDocument:
+    """`diagnosed`'s, where a test has rows enough to be judged by itself."""
+    return cast(
+        "DiagnosisDocument",
+        {**document, "reason": "Direct current, no load and locked rotor together make the circuit below."},
+    )
 
 
 def diagnosed(tables: Sequence[Table], motor: str | None, trust: Trust | None) -> DiagnosisDocument:

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
+from commissioner.diagnose.points.rows import are_three_tests
+from commissioner.diagnose.points.three_tests import ThreeTests, solve
 from commissioner.errors import DataRefused
 
 R1, R2, L1, L2, LM = 0.9, 0.7, 4.1e-3, 4.1e-3, 0.11

@@ -199,7 +199,7 @@ def test_it_is_read_in_ohm_per_star_phase(tmp_path: Path, above: str, name: str,
 def test_a_resistance_that_leaves_no_rotor_is_refused(tmp_path: Path, ohm: str) -> None:
     path = tmp_path / "sheet.csv"
     path.write_text(f"{HEAD},R_UV\nno load,60,208,8.17,420,{ohm}\nlocked rotor,15,25,27.9,920,{ohm}\n")
-    with pytest.raises(DataRefused, match="winding_resistance_uv_ohm does not fit the points"):
+    with pytest.raises(DataRefused, match="winding_resistance_uv_ohm (does not fit the points|makes more copper loss)"):
         identify_any(IdentifyRequest((path,)))
 
 
@@ -345,3 +345,60 @@ def test_a_resistance_that_is_not_understood_is_named(tmp_path: Path) -> None:
 )
 def test_a_resistance_says_in_any_language_where_it_was_measured(name: str, meaning: str) -> None:
     assert resistance_meaning(name) == meaning
+
+
+def in_one_table(named: bool, direct: bool, idle_volts: tuple[float, ...]) -> str:
+    """Two cages, R_R 0.561 ohm at running slip: R_1 0.62 ohm, L_1 4 mH, L_m 110 mH, cages 1.9 ohm, 3.5 mH and 0.9 ohm, 9.5 mH; idle with
+    35 W of friction, iron as the square of the voltage, 65 W at 400 V."""
+    lines = []
+    for hz in (50.0, 25.0, 12.5):
+        w = 2j * np.pi * hz
+        cages = 1.0 / (1.9 + w * 3.5e-3) + 1.0 / (0.9 + w * 9.5e-3)
+        z = 0.62 + w * 4e-3 + 1.0 / (1.0 / (w * 0.11) + cages)
+        lines += [
+            ("locked rotor", hz, np.sqrt(3.0) * abs(z) * a, a, 3.0 * a**2 * z.real, 1.24) for a in (6.0, 10.0, 15.0)
+        ]
+    for volts in idle_volts:
+        amps = volts / np.sqrt(3.0) / abs(0.62 + 2j * np.pi * 50.0 * 0.114)
+        lines.append(("no load", 50.0, volts, amps, 3.0 * amps**2 * 0.62 + 35.0 + 65.0 * (volts / 400.0) ** 2, 1.24))
+    rows = [",".join([row[0], *(f"{x:.7g}" for x in (row[1:5] if direct else row[1:]))]) for row in lines]
+    head = "test,frequency_hz,voltage_line_v,current_line_a,power_w" + ("" if direct else ",winding_resistance_uv_ohm")
+    rows += ["dc,0,12.4,10,"] if direct else []
+    return "\n".join(row if named else row.partition(",")[2] for row in [head, *rows])
+
+
+@pytest.mark.parametrize("direct", [True, False])
+@pytest.mark.parametrize("named", [True, False])
+def test_series_of_two_tests_in_one_table_are_each_judged(tmp_path: Path, named: bool, direct: bool) -> None:
+    path = tmp_path / "type_test_no_load.csv"
+    path.write_text(in_one_table(named, direct, (120.0, 200.0, 280.0, 340.0, 400.0, 430.0)), encoding="utf-8")
+    document = diagnose(DiagnoseRequest((path,), out=tmp_path / "out")).document
+    idle, locked = document["tables"].values()
+    assert list(document["tables"]) == ["type_test_no_load_no_load.csv", "type_test_no_load_locked_rotor.csv"]
+    assert [c["name"] for c in locked["causes"]] == ["rotor_skin_effect"]
+    assert [c["name"] for c in idle["causes"]] == ["iron_loss"]
+    found = locked["parameters_after"]["rotor_resistance_ohm"]
+    assert abs((found["value"] or 0.0) - 0.5612) < 2.0 * (found["std"] or 0.0) < 0.12
+    assert sorted(p.name for p in (tmp_path / "out").glob("*.html")) == [
+        f"report_{name[:-4]}.html" for name in sorted(document["tables"])
+    ]
+
+
+def test_a_series_beside_a_few_points_of_another_test_is_judged_and_the_circuit_told(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(in_one_table(True, False, (200.0, 400.0)), encoding="utf-8")
+    document = diagnose(DiagnoseRequest((path,))).document
+    assert document["verdict"] == "explained" and [c["name"] for c in document["causes"]] == ["rotor_skin_effect"]
+    assert (
+        list(document["tables"]) == ["circuit", "sheet_locked_rotor.csv"]
+        and "leave nothing over" not in document["reason"]
+    )
+    assert document["parameters_after"]["magnetizing_inductance_h"]["value"] == pytest.approx(0.11, rel=0.05)
+
+
+def test_a_row_of_a_series_that_is_called_by_another_tests_name_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    text = in_one_table(True, False, (120.0, 200.0, 280.0, 340.0, 400.0, 430.0))
+    path.write_text(text.replace("no load,50,280", "locked rotor,50,280"), encoding="utf-8")
+    with pytest.raises(DataRefused, match=r"280 V and 4\.51.* A is called locked rotor and is no load by its inductance"):
+        diagnose(DiagnoseRequest((path,)))
