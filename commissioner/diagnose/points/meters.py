@@ -16,7 +16,7 @@ from commissioner.diagnose.intake.points import Array
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import connection_of
-from commissioner.records import DIRECT_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, WATT_METERS
+from commissioner.records import DIRECT_TEST, LOAD_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, WATT_METERS
 
 VOLTS_APART, AMPERES_APART = 0.05, 0.15
 """By which one of three meters may differ from their mean. NEMA MG 1-14.36: no motor is to run on volts that differ by more than
@@ -63,7 +63,17 @@ def line_values(columns: Mapping[str, Array], said: Mapping[str, float | str]) -
         if found and found[0].columns != (line,):
             out[line] = found[0].values
             remarks.append(f"{line} {found[0].said}")
-    return _of_three_phases(LineValues(out, tuple(remarks)))
+    return _of_three_phases(_without_loads(LineValues(out, tuple(remarks))))
+
+
+def _without_loads(seen: LineValues) -> LineValues:
+    """Without rows that the sheet calls those of a load, or of the plate, where others stand beside them: by its inductance alone such a
+    row may be a locked rotor's."""
+    loads = np.asarray(seen.columns.get("test", np.nan)) == LOAD_TEST
+    if not np.any(loads) or np.all(loads):
+        return seen
+    said = f"{int(loads.sum())} rows of a loaded motor were not used."
+    return LineValues({name: values[~loads] for name, values in seen.columns.items()}, (*seen.remarks, said))
 
 
 def _of_three_phases(seen: LineValues) -> LineValues:

@@ -47,6 +47,8 @@ SHOWN = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency":
          "torque": "Nm", "speed": "rad/s"}  # fmt: skip
 SAME_TIME = 0.01
 """Of a sample period, by which two columns of one time may differ."""
+SAME_VALUE = 0.05
+"""Of the largest value, by which two columns of one current or voltage may differ: one of them was rounded, or filtered."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
 """What an instrument calls a channel that nobody has named."""
 _QUANTITY = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D\S*)?")
@@ -95,6 +97,8 @@ def recognise(
         if meaning in columns:
             if meaning == "time_s":
                 _require_one_time(names, (place[meaning], k), (columns[meaning], factor * values[k]), source)
+            elif name not in targets and names[place[meaning]] not in (*targets, *CONTRACT_COLUMNS):
+                _require_alike(names, (place[meaning], k), (columns[meaning], factor * values[k]), meaning, source)
             notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
             meaning = None
         if meaning is None:
@@ -168,6 +172,23 @@ def _require_one_time(names: Sequence[str], places: tuple[int, int], times: tupl
             f"{source}: {first} and {second} are two times, {apart:.4g} s apart", step="read the time", value=f"{apart / steps[0]:.3g} of a sample period",
             limit=f"{SAME_TIME} of one: all channels sampled at one time", remedy="resample all channels to one time column and leave "
             "the others out; where both mean the same, take one as ignore by --map",
+        )  # fmt: skip
+
+
+def _require_alike(
+    names: Sequence[str], places: tuple[int, int], values: tuple[Signal, Signal], meaning: str, source: str
+) -> None:
+    """DataRefused: two columns mean the same current, voltage or power and differ, as of two motors, or of the mains and the motor."""
+    if not meaning.startswith(("current_", "voltage_", "power_")) or values[0].size != values[1].size:
+        return
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(values[1] - values[0]) / np.nanmax(np.abs(values[0]), initial=1e-12)
+    if float(np.nanmax(apart, initial=0.0)) > SAME_VALUE:
+        first, second = (f"{names[k]} (column {k + 1})" for k in places)
+        raise DataRefused(
+            f"{source}: {first} and {second} both mean {meaning} and differ", step="recognise columns",
+            value=f"{float(np.nanmax(apart)):.3g} of the largest value", limit=f"{SAME_VALUE}, or one column",
+            remedy=f"take the column that is not meant out of the file, or as ignore: {HOW_TO_MAP}",
         )  # fmt: skip
 
 

@@ -9,13 +9,15 @@ from itertools import pairwise
 import numpy as np
 
 from commissioner.recordings.words import folded, translated
-from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, ReadingNote, Signal
+from commissioner.records import DIRECT_TEST, IDLE_TEST, LOAD_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, ReadingNote, Signal
 
 TITLES = frozenset({"test", "testtype", "typetest", "kind", "pruefung", "versuchsart", "typeoftest"})
 WORDS = {
     DIRECT_TEST: r"dc|cc|directcurrent|winding(?:resistance)?|resistance|resistancewinding|wicklungswiderstand",
     IDLE_TEST: r"noload|idle|idling|leerlaufversuch|unloaded",
     LOCKED_TEST: r"(?:locked|blocked)(?:rotor)?|(?:en|in|a)?shortcircuit|kurzschlu(?:ss|ß)(?:versuch)?|festgebremst|arotorlocked|a?lockedrotor|standstill",
+    LOAD_TEST: r"(?:full|half|rated|nominal|part(?:ial)?)*(?:load(?:ed)?|operatingpoint)(?:nominal|rated)?|rated(?:point|values)?|nominal(?:point|values)?|(?:nenn|teil|voll)?(?:last|betrieb)(?:punkt|lauf|versuch)?"
+    r"|belastungs?(?:versuch|lauf|punkt)?|(?:bemessungs|nenn)(?:punkt|werte)|(?:name|rating)?plate|typenschild",
 }  # fmt: skip
 SINGLE_PHASE = re.compile(
     r"single[\W_]*phase|\b1[\W_]*(?:ph(?:ase|asig)?\b|~)|einphasig\w*|mono(?:ph|f)as\w*", re.IGNORECASE
@@ -45,7 +47,7 @@ def _code(cell: str) -> float:
     words, is_single = SINGLE_PHASE.subn(" ", folded(cell))
     one = re.sub("^test|test$", "", _letters(words))
     code = next((c for c, w in WORDS.items() if re.fullmatch(w, one)), np.nan)
-    return SINGLE_PHASE_TEST if is_single and code != DIRECT_TEST else code
+    return SINGLE_PHASE_TEST if is_single and code not in (DIRECT_TEST, LOAD_TEST) else code
 
 
 def unknown(cells: Sequence[str], said: Signal) -> tuple[ReadingNote, ...]:

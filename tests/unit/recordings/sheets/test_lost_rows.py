@@ -1,0 +1,90 @@
+"""Rows and columns that would be lost, or read as another's, with the values of those that are left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commissioner.errors import DataRefused
+from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
+from commissioner.recordings.importers import contract_table, read_running
+
+TESTS = "test,f (Hz),U (V),I (A),P (W)\ndc,0,13.6,28.0,\nno load,60,208,8.17,420\nlocked rotor,15,25,27.9,920\n"
+TRUE = [0.2429, 0.1514, 3.484e-3, 35.11e-3]
+NAMES = "Time,Ia,Ib,Ic,Vab,Vbc,Vca\n"
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "given.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def running(times: int = 64, **columns: float) -> str:
+    """Rows of three currents and three line voltages; `columns`: more of the first current, times a factor."""
+    t = np.arange(times) / 5000.0
+    angles = [100 * np.pi * t - 2 * np.pi * k / 3 for k in range(3)]
+    six = [*(7.0 * np.cos(a - 0.6) for a in angles), *(565.0 * np.cos(a + np.pi / 6) for a in angles)]
+    more = [factor * six[0] for factor in columns.values()]
+    rows = [",".join(f"{x:.6g}" for x in row) for row in zip(t, *six, *more, strict=True)]
+    return "\n".join([",".join([*NAMES.strip().split(","), *columns]), *rows]) + "\n"
+
+
+def test_a_test_named_once_for_its_points_loses_none(tmp_path: Path) -> None:
+    text = "Report\ntest,f,U,I,P\n,Hz,V,A,W\nno load,60,208,8.17,420\n,60,150,5.7,260\nlocked rotor,15,25,27.9,920\ndc,0,13.6,28,\n"
+    table = contract_table(written(tmp_path, text))
+    np.testing.assert_array_equal(table.columns["voltage_line_v"], [208, 150, 25, 13.6])
+    np.testing.assert_array_equal(table.columns["test"], [1, np.nan, 2, 0])
+
+
+def test_a_plate_beside_the_rows_loses_none(tmp_path: Path) -> None:
+    lines = TESTS.splitlines()
+    beside = [",,Rated power,5.5,kW", ",,Rated voltage,208,V", ",,Rated current,27.9,A", ",,,,"]
+    table = contract_table(written(tmp_path, "\n".join(a + b for a, b in zip(lines, beside, strict=True)) + "\n"))
+    np.testing.assert_array_equal(table.columns["frequency_hz"], [0, 60, 15])
+
+
+@pytest.mark.parametrize("title", ["DC test\nU (V),I (A)\n13.6,28\n", "U (V),I (A),f (Hz),P (W)\n13.6,28,0,0\n"])
+def test_tables_one_below_the_other_are_refused_by_their_rows(tmp_path: Path, title: str) -> None:
+    """Frequency 13.6 Hz and 28 V were read of the direct-current test, under the names of the first table."""
+    text = "No-load test\nf (Hz),U (V),I (A),P (W)\n60,208,8.17,420\n\n" + title
+    with pytest.raises(DataRefused, match=r"as 60, 208, 8\.17, 420") as refused:
+        contract_table(written(tmp_path, text))
+    assert "a column `test`" in refused.value.remedy
+
+
+@pytest.mark.parametrize("named", ["rated", "Full load", "Nennlast", "charge nominale", "Belastungsversuch", "plate"])
+def test_a_row_of_a_load_is_no_locked_rotor(tmp_path: Path, named: str) -> None:
+    """R_R was 21 % too large, extrapolated over frequency from a rated row taken as a locked rotor."""
+    done = identify_any(IdentifyRequest((written(tmp_path, f"{TESTS}{named},60,208,27.9,8200\n"),)))
+    assert isinstance(done, IdentifiedSheets)
+    found = [q["value"] for q in done.document["parameters"].values()]
+    assert found[:4] == pytest.approx(TRUE, rel=1e-3)
+    assert any("1 rows of a loaded motor" in remark for remark in done.document["remarks"])
+
+
+def test_two_columns_of_one_current_that_differ_are_asked_for(tmp_path: Path) -> None:
+    """The mains' currents were taken for the motor's, which stood behind them."""
+    with pytest.raises(
+        DataRefused, match=r"Ia \(column 2\) and Motor current A \(column 8\) both mean current_u_a"
+    ) as refused:
+        read_running(written(tmp_path, running(**{"Motor current A": 1.3})))
+    assert refused.value.value == "0.3 of the largest value"
+    seen = read_running(written(tmp_path, running(**{"Motor current A": 1.01})))
+    assert {note.code for note in seen.notes} >= {"second_column"}
+
+
+@pytest.mark.parametrize("cell", ["9.91E+37", "-9.9e37", "+9.90000000E+037"])
+def test_what_instruments_print_for_no_reading_is_none(tmp_path: Path, cell: str) -> None:
+    lines = running().splitlines()
+    lines[30] = ",".join([lines[30].split(",")[0], cell, *lines[30].split(",")[2:]])
+    table = contract_table(written(tmp_path, "\n".join(lines) + "\n"))
+    assert np.flatnonzero(~np.isfinite(table.columns["current_u_a"])).tolist() == [29]
+
+
+def test_a_row_of_units_that_begins_with_a_multiple_is_not_lost(tmp_path: Path) -> None:
+    text = running().replace(NAMES, NAMES + "100 ns,mA,mA,mA,V,V,V\n")
+    with pytest.raises(DataRefused, match="100 ns of Time is none that is known"):
+        read_running(written(tmp_path, text))
