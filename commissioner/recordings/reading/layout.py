@@ -191,7 +191,7 @@ def _begun(lines: Sequence[_Line], first: int, separator: str, rows: Sequence[Ro
     while any(texts) and first > 0:
         row = split(lines[first - 1].text, separator)
         kinds = list(zip(row, texts, numbers, strict=False))
-        is_fit = len(row) == len(rows[0]) and sum(of_numbers and is_number(c) for c, _, of_numbers in kinds) > 1
+        is_fit = len(row) <= len(rows[0]) and sum(of_numbers and is_number(c) for c, _, of_numbers in kinds) > 1
         if not is_fit or any(
             (of_text and is_number(c)) or (of_numbers and not is_numeric(c)) for c, of_text, of_numbers in kinds
         ):

@@ -254,6 +254,8 @@ def _factor(name: str, unit: str, meaning: str, source: str) -> float:
     """To SI. DataRefused: mega or milli, a unit of something else, one that needs a factor which is not given, or none that is
     known."""
     known, bare = read_unit(unit), unbracketed(unit).lower()
+    if meaning == "power_factor" and bare == "%":
+        return 0.01
     if known is None and bare in FOREIGN:
         raise _refused(name, unit, meaning, source, "a unit that needs a factor")
     if known is None and (bare in NO_UNIT or is_remark(bare)):

@@ -101,7 +101,8 @@ def test_a_diagnosis_of_three_tests_says_that_nothing_is_left_over(tmp_path: Pat
     ("head", "row", "lacks"),
     [
         ("f,U,I,W1", "50,400,3,900", "power_w"),
-        ("f [Hz],U [V],I [A],cos phi", "50,400,3,0.2", "power_w"),
+        ("f [Hz],U [V],I [A],S [VA]", "50,400,3,2078", "power_w"),
+        ("U [V],I [A],cos phi", "50,3,0.2", "power_w"),
         ("f,U1,U2,U3,I,P", "50,231,231,231,3,400", "voltage_line_v"),
         ("Frecuencia (Hz),Tensión (V),Corriente (A)", "50,231,3", "power_w"),
     ],

@@ -46,6 +46,12 @@ def test_a_plate_beside_the_rows_loses_none(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table.columns["frequency_hz"], [0, 60, 15])
 
 
+def test_a_first_row_that_is_too_short_is_refused(tmp_path: Path) -> None:
+    text = TESTS.replace("P (W)", "P (W),T (degC)").replace("420", "420,25").replace("920", "920,25")
+    with pytest.raises(DataRefused, match="a row holds 5 columns"):
+        contract_table(written(tmp_path, text))
+
+
 @pytest.mark.parametrize("title", ["DC test\nU (V),I (A)\n13.6,28\n", "U (V),I (A),f (Hz),P (W)\n13.6,28,0,0\n"])
 def test_tables_one_below_the_other_are_refused_by_their_rows(tmp_path: Path, title: str) -> None:
     """Frequency 13.6 Hz and 28 V were read of the direct-current test, under the names of the first table."""
