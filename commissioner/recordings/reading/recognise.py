@@ -47,6 +47,8 @@ SHOWN = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency":
          "torque": "Nm", "speed": "rad/s"}  # fmt: skip
 SAME_TIME = 0.01
 """Of a sample period, by which two columns of one time may differ."""
+INDEX, LEAST_ROWS = "__index_level_0__", 16
+"""What pandas calls an index without a name in Parquet (in CSV nothing), and rows from which on its steps tell what it is."""
 SAME_VALUE = 0.05
 """Of the largest value, by which two columns of one current or voltage may differ: one of them was rounded, or filtered."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
@@ -69,6 +71,7 @@ def recognise(
 ) -> Recognised:  # fmt: skip
     """The columns by the contract's names where they mean one, else by their own; see the module. `said`: units that stand once above
     the columns."""
+    names, indexed = _with_index(names, values)
     own, units = units, [unit or _said_once(name, said) for name, unit in zip(names, units, strict=True)]
     names = [f"{n} [{u}]" if is_temperature(u) and not unit_in(n) else n for n, u in zip(names, units, strict=True)]
     meant = in_company(names)
@@ -78,7 +81,7 @@ def recognise(
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
     meaning: str | None
-    readings, notes, unnamed, rms = [], [], [], []
+    readings, notes, unnamed, rms = [], indexed, [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
         name = names[k]
@@ -122,6 +125,23 @@ def recognise(
     )
     notes += _units_apart(readings, said, targets, source)
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _with_index(names: Sequence[str], values: Sequence[Signal]) -> tuple[Sequence[str], list[ReadingNote]]:
+    """The names with that of a time for an index, as pandas saves it, where no other is a time, and it rises evenly and not by ones."""
+    place = next((k for k, name in enumerate(names) if name == INDEX or (not name and k == 0)), None)
+    if place is None or values[place].size < LEAST_ROWS or any(map(_is_time, names)):
+        return names, []
+    steps = np.diff(values[place])
+    usual = float(np.median(steps))
+    if not (usual > 0.0 and usual % 1.0 and np.all(np.abs(steps - usual) < usual / 2.0)):
+        return names, []
+    what = f"column {place + 1} has no name and rises by {usual:.4g} from row to row: taken as the time in seconds"
+    return [*names[:place], "time_s", *names[place + 1 :]], [ReadingNote("index", what)]
+
+
+def _is_time(name: str) -> bool:
+    return meaning_of(name) == "time_s"
 
 
 def _said_once(name: str, said: Mapping[str, UnitSaid]) -> str:

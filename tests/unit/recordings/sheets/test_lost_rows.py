@@ -94,3 +94,16 @@ def test_a_row_of_units_that_begins_with_a_multiple_is_not_lost(tmp_path: Path) 
     text = running().replace(NAMES, NAMES + "100 ns,mA,mA,mA,V,V,V\n")
     with pytest.raises(DataRefused, match="100 ns of Time is none that is known"):
         read_running(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(("scale", "is_time"), [(1.0, True), (5000.0, False)])
+def test_an_index_without_a_name_is_the_time_unless_it_counts(tmp_path: Path, scale: float, is_time: bool) -> None:
+    rows = [line.split(",") for line in running().splitlines()[1:]]
+    lines = [NAMES.strip().replace("Time", ""), *(",".join([f"{scale * float(r[0]):.4f}", *r[1:]]) for r in rows)]
+    path = written(tmp_path, "\n".join(lines) + "\n")
+    if is_time:
+        seen = read_running(path)
+        assert seen.sample_period_s == pytest.approx(2e-4) and "index" in {note.code for note in seen.notes}
+    else:
+        with pytest.raises(DataRefused, match="lacks time"):
+            read_running(path)
