@@ -76,7 +76,7 @@ def _without_loads(seen: LineValues) -> LineValues:
     loads = np.asarray(seen.columns.get("test", np.nan)) == LOAD_TEST
     if not np.any(loads) or np.all(loads):
         return seen
-    said = f"{int(loads.sum())} rows of a loaded motor were not used."
+    said = f"{int(loads.sum())} rows of a loaded motor or of another name were not used."
     return LineValues({name: values[~loads] for name, values in seen.columns.items()}, (*seen.remarks, said))
 
 

@@ -185,19 +185,17 @@ def _go_on(first: Row, lines: Sequence[_Line], separator: str) -> bool:
 def _begun(lines: Sequence[_Line], first: int, separator: str, rows: Sequence[Row]) -> int:
     """Where a table with texts begins: the rows above the ones alike fit its columns, though a text stands in some of them only (a test
     named once for its points, a plate beside them)."""
-    columns = list(zip(*rows, strict=True))
-    texts = [not all(map(is_numeric, cells)) for cells in columns]
-    numbers = [any(map(is_number, cells)) and not of_text for cells, of_text in zip(columns, texts, strict=True)]
-    while any(texts) and first > 0:
-        row = split(lines[first - 1].text, separator)
-        kinds = list(zip(row, texts, numbers, strict=False))
-        is_fit = len(row) <= len(rows[0]) and sum(of_numbers and is_number(c) for c, _, of_numbers in kinds) > 1
-        if not is_fit or any(
-            (of_text and is_number(c)) or (of_numbers and not is_numeric(c)) for c, of_text, of_numbers in kinds
-        ):
+    numbers = [any(map(is_number, cells)) for cells in zip(*rows, strict=True)]
+    begins = first
+    while not all(numbers) and begins > 0:
+        row = split(lines[begins - 1].text, separator)
+        kinds = list(zip(row, numbers, strict=False))
+        is_fit = len(row) <= len(rows[0]) and sum(of_numbers and is_number(cell) for cell, of_numbers in kinds) > 1
+        if not is_fit or any(of_numbers and not is_numeric(cell) for cell, of_numbers in kinds):
             break
-        first -= 1
-    return first
+        begins -= 1
+    above = [split(line.text, separator) for line in lines[max(begins - 2, 0) : begins]]
+    return begins if any(_known(row) > 1 for row in above) else first
 
 
 def _require_one_table(above: Sequence[Row], source: str) -> None:

@@ -68,7 +68,7 @@ def test_a_row_of_a_load_is_no_locked_rotor(tmp_path: Path, named: str) -> None:
     assert isinstance(done, IdentifiedSheets)
     found = [q["value"] for q in done.document["parameters"].values()]
     assert found[:4] == pytest.approx(TRUE, rel=1e-3)
-    assert any("1 rows of a loaded motor" in remark for remark in done.document["remarks"])
+    assert any("1 rows of a loaded motor or of another name" in remark for remark in done.document["remarks"])
 
 
 def test_two_columns_of_one_current_that_differ_are_asked_for(tmp_path: Path) -> None:
@@ -107,3 +107,34 @@ def test_an_index_without_a_name_is_the_time_unless_it_counts(tmp_path: Path, sc
     else:
         with pytest.raises(DataRefused, match="lacks time"):
             read_running(path)
+
+
+@pytest.mark.parametrize("named", ["100 %", "S1", "Punkt 7", "mean"])
+def test_a_row_of_another_name_is_neither_test_beside_both(tmp_path: Path, named: str) -> None:
+    done = identify_any(
+        IdentifyRequest((written(tmp_path, f"{TESTS}{named},60,208,27.9,8200\nno load warm,60,208,8.17,420\n"),))
+    )
+    assert isinstance(done, IdentifiedSheets)
+    found = [q["value"] for q in done.document["parameters"].values()]
+    assert found[:4] == pytest.approx(TRUE, rel=1e-3)
+    assert any("1 rows of a loaded motor or of another name" in remark for remark in done.document["remarks"])
+
+
+@pytest.mark.parametrize(("column", "others"), [("Motor", ("M1", "M2")), ("Serial no.", ("4711", "4712"))])
+def test_rows_of_two_motors_are_not_taken_together(tmp_path: Path, column: str, others: tuple[str, str]) -> None:
+    """R_s of the two was averaged."""
+    head, *rows = TESTS.splitlines()
+    lines = [f"{column},{head}", *(f"{motor},{row}" for motor in others for row in rows)]
+    with pytest.raises(DataRefused, match="its rows are of 2 motors") as refused:
+        contract_table(written(tmp_path, "\n".join(lines) + "\n"))
+    assert refused.value.value == ", ".join(others)
+    one = "\n".join([lines[0], *lines[1:4]]) + "\n"
+    np.testing.assert_array_equal(contract_table(written(tmp_path, one)).columns["test"], [0, 1, 2])
+
+
+def test_a_row_without_a_name_is_no_locked_rotor_by_its_inductance(tmp_path: Path) -> None:
+    done = identify_any(IdentifyRequest((written(tmp_path, f"{TESTS},60,208,27.9,8200\n,15,20,22.32,588.8\n"),)))
+    assert isinstance(done, IdentifiedSheets)
+    found = [q["value"] for q in done.document["parameters"].values()]
+    assert found[:4] == pytest.approx(TRUE, rel=1e-3) and done.document["rows"]["locked rotor"] == 2
+    assert "1 points of a loaded motor were not used." in done.document["remarks"]
