@@ -35,10 +35,11 @@ RPM = 30.0 / np.pi
 POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
 """What a table of steady-state test points needs: line values rms, power of all three phases."""
 WATT_METERS = ("power_1_w", "power_2_w", "power_3_w")
-POINT_FORMS = ("voltage_neutral_v", "voltage_phase_v", "current_phase_a", *WATT_METERS)
-"""What may stand in place of line values and of the power of all phases: volts to the neutral, of a phase; amperes of a phase; wattmeters."""
-DIRECT_TEST, IDLE_TEST, LOCKED_TEST, SINGLE_PHASE_TEST = 0.0, 1.0, 2.0, 3.0
-"""In the column `test` of a test sheet; the last: a locked rotor with single-phase alternating current."""
+POINT_FORMS = ("voltage_neutral_v", "voltage_phase_v", "current_phase_a", *WATT_METERS, "power_phase_w", "power_factor")
+"""What may stand in place of line values and of the power of all phases: volts to the neutral, of a phase; amperes of a phase; wattmeters, the
+power of one phase, the power factor."""
+DIRECT_TEST, IDLE_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, LOAD_TEST = 0.0, 1.0, 2.0, 3.0, 4.0
+"""In the column `test` of a test sheet; single phase: a locked rotor with such current; load: a turning motor with one."""
 TERMINAL_PAIRS = ("winding_resistance_uv_ohm", "winding_resistance_vw_ohm", "winding_resistance_wu_ohm")
 WINDINGS = ("winding_resistance_u_ohm", "winding_resistance_v_ohm", "winding_resistance_w_ohm")
 POINT_RESISTANCES = (

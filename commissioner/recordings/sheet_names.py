@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Set
 
 from commissioner.recordings.names import ALPHABETS, PHASES, is_remark, key_of, meanings_of
 from commissioner.recordings.units import IN_NAME, unit_in
@@ -34,12 +34,16 @@ SHEET = {
     "power_w": re.compile(
         r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)+power(?:total)?|powerinput|inputwatts"
     ),
+    "power_phase_w": re.compile(
+        r"p(?:ph|phase|perphase|str)|(?:active|input)?(?:power|leistung)(?:per|pro|je)?(?:phase|strang)|(?:phase|strang)(?:power|leistung)"
+    ),
+    "power_factor": re.compile(r"cos(?:ine)?(?:phi|φ|ϕ)?|pf|powerfactor|leistungsfaktor|λ|lambda"),
 }  # fmt: skip
 """Line values, values of one phase, and the power of all phases. Values of each phase (`I_u`, `U_12`) are a recording's columns."""
 FORMS = {
     "voltage_line_v": ("voltage_line_v", "voltage_neutral_v", "voltage_phase_v"),
     "current_line_a": ("current_line_a", "current_phase_a"),
-    "power_w": ("power_w", *WATT_METERS),
+    "power_w": ("power_w", *WATT_METERS, "power_phase_w"),
 }  # fmt: skip
 """What a test sheet needs, in any of these columns or, of volts and amperes, in those of each phase."""
 _OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|standerwicklungs)*(?:resistance|widerstand|r)"
@@ -173,7 +177,7 @@ def is_sheet(names: Iterable[str]) -> bool:
     """Whether names are those of a test sheet: volts, amperes and watts in one of their `FORMS`, none twice, and no time."""
     names = [n for n in names if n]
     own, meters = _own(names), _meters(names)
-    has_all = all(own.keys() & set(forms) or form_of(need) & meters for need, forms in FORMS.items())
+    has_all = all(_has(need, own.keys(), meters) for need in FORMS)
     return has_all and own.total() == len(own) and "time_s" not in meters
 
 
@@ -183,7 +187,13 @@ def missing_of_sheet(names: Iterable[str]) -> list[str]:
     own, meters = _own(names).keys(), _meters(names)
     if "time_s" in meters or not ("frequency_hz" in own or len(own) > 1):
         return []
-    return [need for need, forms in FORMS.items() if not own & set(forms) and not form_of(need) & meters]
+    return [need for need in FORMS if not _has(need, own, meters)]
+
+
+def _has(need: str, own: Set[str], meters: Set[str]) -> bool:
+    """Whether a sheet gives it in any form. A power factor stands for watts beside a frequency: without one it may be a plate's."""
+    is_factor = need == "power_w" and {"frequency_hz", "power_factor"} <= own
+    return is_factor or bool(own & set(FORMS[need]) or form_of(need) & meters)
 
 
 def form_of(need: str) -> frozenset[str]:

@@ -16,10 +16,36 @@ BASE = {
     "nm": "torque", "va": "apparent", "var": "apparent", "arms": "current", "aeff": "current", "vrms": "voltage", "veff": "voltage",
 }  # fmt: skip
 """Unit without prefix, in lower case, and what it measures."""
+PER_MINUTE = frozenset(
+    [
+        "rpm",
+        "r.p.m.",
+        "1/min",
+        "/min",
+        "min-1",
+        "min⁻¹",
+        "min^-1",
+        "r/min",
+        "rev/min",
+        "u/min",
+        "tr/min",
+        "tr/mn",
+        "giri/min",
+        "obr/min",
+        "obr./min",
+        "ot/min",
+        "d/dak",
+        "dev/dak",
+        "rot/min",
+        "omw/min",
+        "varv/min",
+        "об/мин",
+    ]
+)
+"""Turns a minute, as sheets write them."""
 WHOLE = {
-    "rad/s": ("speed", 1.0), "rads": ("speed", 1.0), "1/s": ("frequency", 1.0), "rpm": ("speed", math.pi / 30), "krpm": ("speed", 1e3 * math.pi / 30),
-    "1/min": ("speed", math.pi / 30), "min-1": ("speed", math.pi / 30), "r/min": ("speed", math.pi / 30),
-    "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "giri/min": ("speed", math.pi / 30), "min⁻¹": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
+    "rad/s": ("speed", 1.0), "rads": ("speed", 1.0), "1/s": ("frequency", 1.0), "krpm": ("speed", 1e3 * math.pi / 30),
+    **dict.fromkeys(PER_MINUTE, ("speed", math.pi / 30)),
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
     "°": ("angle", 1.0), "rev": ("angle", 360.0), "turn": ("angle", 360.0), "turns": ("angle", 360.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
     "grad": ("angle", 1.0), "grados": ("angle", 1.0), "gradi": ("angle", 1.0), "degrés": ("angle", 1.0), "rad": ("angle", 180.0 / math.pi),

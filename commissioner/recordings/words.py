@@ -54,7 +54,9 @@ TRANSLATED = {
     "nominale": "nominal", "nominales": "nominal", "asignada": "nominal", "asignado": "nominal", "assignée": "nominal", "assigné": "nominal",
     "ensayo": "test", "prueba": "test", "prova": "test", "essai": "test", "versuch": "test", "prüfung": "test",
     "vacío": "no load", "en vacío": "no load", "a vuoto": "no load", "in vuoto": "no load", "à vide": "no load", "leerlauf": "no load",
-    "em vazio": "no load", "ensaio": "test", "nullast": "no load", "proef": "test", "kortsluiting": "short circuit",
+    "charge": "load", "carga": "load", "carico": "load", "en charge": "load", "con carga": "load", "em carga": "load", "sotto carico": "load",
+    "pleine charge": "full load", "plena carga": "full load", "pieno carico": "full load", "sans charge": "no load", "sin carga": "no load",
+    "sem carga": "no load", "senza carico": "no load", "em vazio": "no load", "ensaio": "test", "nullast": "no load", "proef": "test", "kortsluiting": "short circuit",
     "frequência": "frequency", "frequentie": "frequency", "potência": "power", "vermogen": "power", "velocidade": "speed",
     "toerental": "speed", "weerstand": "resistance",
     "rotor bloqueado": "locked rotor", "a rotor bloqueado": "locked rotor", "a rotore bloccato": "locked rotor", "à rotor bloqué": "locked rotor", "rotor trabado": "locked rotor", "rotore bloccato": "locked rotor", "rotor bloqué": "locked rotor",
@@ -67,6 +69,28 @@ TRANSLATED = {
     "frequenza di campionamento": "sample rate", "passo di campionamento": "sample interval",
     "de": " ", "del": " ", "de la": " ", "di": " ", "dello": " ", "della": " ", "du": " ", "des": " ", "d'": " ", "dell'": " ",
     "l'": " ", "d'un": " ", "de los": " ", "degli": " ", "en la": " ", "nella": " ", "al": " ", "allo": " ", "alla": " ",
+    "znamionowa": "nominal", "znamionowe": "nominal", "znamionowy": "nominal", "znamionowej": "nominal", "anma": "nominal",
+    "moc": "power", "mocy": "power", "güç": "power", "gücü": "power", "výkon": "power", "effekt": "power", "мощность": "power",
+    "功率": "power", "częstotliwość": "frequency", "frekans": "frequency", "frekansı": "frequency", "frekvence": "frequency",
+    "frekvens": "frequency", "частота": "frequency", "频率": "frequency", "prędkość": "speed", "obroty": "speed", "hız": "speed",
+    "hızı": "speed", "devir": "speed", "devri": "speed", "rotação": "speed", "sprawność": "efficiency", "verim": "efficiency",
+    "verimi": "efficiency", "współczynnik mocy": "power factor", "güç faktörü": "power factor", "güç katsayısı": "power factor",
+    "fator de potência": "power factor", "moment bezwładności": "moment of inertia", "atalet momenti": "moment of inertia",
+    "momento de inércia": "moment of inertia", "inércia": "inertia", "faza": "phase", "fazy": "phase", "fazowe": "phase",
+    "fazowy": "phase", "faz": "phase", "fazı": "phase", "międzyfazowe": " ", "międzyfazowy": " ", "przewodowe": " ", "przewodowy": " ",
+    "rezystancja": "resistance", "direnç": "resistance", "direnci": "resistance", "resistência": "resistance", "uzwojenia": "winding",
+    "uzwojenie": "winding", "sargı": "winding", "między": "between", "zaciskami": "terminals", "zaciski": "terminals", "próba": "test",
+    "deney": "test", "deneyi": "test", "zkouška": "test", "prov": "test", "опыт": "test", "试验": "test", "bieg jałowy": "no load",
+    "biegu jałowego": "no load", "na biegu jałowym": "no load", "boşta": "no load", "boşta çalışma": "no load", "yüksüz": "no load",
+    "naprázdno": "no load", "tomgång": "no load", "холостой ход": "no load", "空载": "no load", "zwarcie": "short circuit",
+    "zwarcia": "short circuit", "kısa devre": "short circuit", "nakrátko": "short circuit", "kortslutning": "short circuit",
+    "короткое замыкание": "short circuit", "kilitli rotor": "locked rotor", "rotor travado": "locked rotor", "堵转": "locked rotor",
+    "prąd stały": "direct current", "doğru akım": "direct current", "stejnosměrný proud": "direct current", "likström": "direct current",
+    "gelijkstroom": "direct current", "постоянный ток": "direct current", "直流": "direct current", "obciążenie": "load", "yük": "load",
+    "średnia": "mean", "średni": "mean", "ortalama": "mean", "rozruchowy": "starting", "partida": "starting", "kalkış": "starting",
+    "conjugado": "torque", "liczba biegunów": "number of poles", "kutup sayısı": "number of poles", "połączenie": "connection",
+    "bağlantı": "connection", "ligação": "connection", "süre": "time", "instante": "time", "akımı": "current", "gerilimi": "voltage",
+    "příkon": "input power", "phasenstrom": "phase strom",
 }  # fmt: skip
 """What only joins names is a space. With their accents, which name the code page of a text; looked for with or without them."""
 
@@ -76,6 +100,8 @@ def folded(text: str) -> str:
     return (
         "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
         .replace("ı", "i")
+        .replace("ł", "l")
+        .replace("Ł", "L")
         .replace("ß", "ss")
     )
 

@@ -16,11 +16,13 @@ from commissioner.diagnose.intake.points import Array
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import connection_of
-from commissioner.records import DIRECT_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, WATT_METERS
+from commissioner.records import DIRECT_TEST, LOAD_TEST, LOCKED_TEST, SINGLE_PHASE_TEST, WATT_METERS
 
 VOLTS_APART, AMPERES_APART = 0.05, 0.15
 """By which one of three meters may differ from their mean. NEMA MG 1-14.36: no motor is to run on volts that differ by more than
 5 %, and currents differ by 6 to 10 times as much; with the 1 % beyond which it derates, and meters of class 2.5, 15 %."""
+FACTOR_STEP = 0.02
+"""Of a power factor that is printed with two digits, in which a meter of class 1 may be wrong at no load."""
 ROOT_3 = float(np.sqrt(3.0))
 
 
@@ -60,10 +62,22 @@ def line_values(columns: Mapping[str, Array], said: Mapping[str, float | str]) -
         found = [form for form in given if isinstance(form, _Form)]
         if (against := _contradiction(found, columns)) is not None:
             return against
-        if found and found[0].columns != (line,):
-            out[line] = found[0].values
-            remarks.append(f"{line} {found[0].said}")
-    return _of_three_phases(LineValues(out, tuple(remarks)))
+        for form in reversed(found):
+            is_there = np.isfinite(form.values)
+            if form.columns != (line,) and np.any(is_there & ~np.isfinite(found[0].values) | (form is found[0])):
+                remarks.append(f"{line} {form.said}")
+            out[line] = np.where(is_there, form.values, out.get(line, form.values))
+    return _of_three_phases(_without_loads(LineValues(out, tuple(remarks))))
+
+
+def _without_loads(seen: LineValues) -> LineValues:
+    """Without rows that the sheet calls those of a load, or of the plate, where others stand beside them: by its inductance alone such a
+    row may be a locked rotor's."""
+    loads = np.asarray(seen.columns.get("test", np.nan)) == LOAD_TEST
+    if not np.any(loads) or np.all(loads):
+        return seen
+    said = f"{int(loads.sum())} rows of a loaded motor or of another name were not used."
+    return LineValues({name: values[~loads] for name, values in seen.columns.items()}, (*seen.remarks, said))
 
 
 def _of_three_phases(seen: LineValues) -> LineValues:
@@ -104,6 +118,8 @@ def _amperes(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> I
 def _watts(columns: Mapping[str, Array], _said: Mapping[str, float | str]) -> Iterator[_Form | DataRefused]:
     """The power of all phases. `columns`: with line volts and amperes as far as they are known."""
     yield from _as_given(columns, "power_w")
+    yield from _of_one_phase(columns)
+    yield from _of_power_factor(columns)
     there = tuple(name for name in WATT_METERS if name in columns)
     if len(there) == 1 and "power_w" not in columns:
         yield refused(
@@ -120,6 +136,49 @@ def _watts(columns: Mapping[str, Array], _said: Mapping[str, float | str]) -> It
     else:
         yield _Form(
             there, np.where(direct, np.nansum(shown, axis=0), shown.sum(axis=0)), f"is the sum of {', '.join(there)}."
+        )
+
+
+def _of_one_phase(columns: Mapping[str, Array]) -> Iterator[_Form | DataRefused]:
+    """Three times the power of a phase; of direct current what was written."""
+    for form in _as_given(columns, "power_phase_w"):
+        if np.any(np.asarray(columns.get("test", np.nan)) == SINGLE_PHASE_TEST):
+            yield refused(
+                "power_phase_w stands beside a single-phase test, whose power may be all of it", None, "the power of all phases in that row",
+                "give power_w",
+            )  # fmt: skip
+        else:
+            yield _Form(form.columns, np.where(_direct(columns), 1.0, 3.0) * form.values, "is 3 times power_phase_w.")
+
+
+def _of_power_factor(columns: Mapping[str, Array]) -> Iterator[_Form | DataRefused]:
+    """Watts of sqrt(3) V I cos phi, where none are given. DataRefused: where both are and contradict each other, beyond what a printed
+    factor is rounded by."""
+    if not {"power_factor", "voltage_line_v", "current_line_a"} <= columns.keys():
+        return
+    factor = np.where(_direct(columns), np.nan, columns["power_factor"])
+    apparent = ROOT_3 * np.asarray(columns["voltage_line_v"]) * np.asarray(columns["current_line_a"])
+    watts = np.asarray(columns.get("power_w", np.full(factor.size, np.nan)))
+    if (wrong := np.flatnonzero(np.abs(factor) > 1.0)).size:
+        yield refused(
+            f"power_factor is {factor[wrong[0]]:g} in row {wrong[0] + 1}", float(factor[wrong[0]]), "at most 1",
+            "write its unit, if it is per cent: `cos phi (%)`",
+        )  # fmt: skip
+        return
+    told = watts / apparent
+    if (off := np.flatnonzero(np.abs(told - factor) > FACTOR_STEP + AMPERES_APART * np.abs(factor))).size:
+        yield refused(
+            f"power_w of row {off[0] + 1} is a power factor of {told[off[0]]:.3g}, and the sheet says {factor[off[0]]:.3g}",
+            float(told[off[0]] / factor[off[0]]), "a ratio of 1 with line-to-line volts, line amperes and the watts of all phases",
+            "correct what is a phase's (3 times its watts, sqrt(3) times its volts), or take the wrong column out",
+        )  # fmt: skip
+    elif not {"power_phase_w", *WATT_METERS} & columns.keys() and np.any(
+        lacks := np.isfinite(factor) & ~np.isfinite(watts)
+    ):
+        yield _Form(
+            ("power_factor",),
+            np.where(lacks, factor * apparent, np.nan),
+            "is sqrt(3) times volts, amperes and power_factor.",
         )
 
 

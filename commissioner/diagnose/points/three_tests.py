@@ -30,8 +30,11 @@ from commissioner.diagnose.points.table import lacking
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.running import TCircuit
-from commissioner.records import IDLE_TEST, POINT_COLUMNS
+from commissioner.records import IDLE_TEST, LOCKED_TEST, POINT_COLUMNS
 
+UNLIKE = 1.5
+"""Of the inductance of the rows called locked rotor, beyond which a row without a name is none: that of 5.5 kW at its rated load in
+`tests/unit/recordings/sheets/test_lost_rows.py` has 1.9 times it."""
 SPLIT = {"A": 1.0, "B": 0.67, "C": 0.43, "D": 1.0, "N": 1.0}
 """X_1 over X_2 by design class (IEEE 112-2017, table 5; IEC's N as A)."""
 LOW_FREQUENCY = 0.25
@@ -154,9 +157,13 @@ def _by_kind(ac: Rows) -> tuple[Rows, Rows, tuple[str, ...]]:
         is_idle, ac = (ac.said == IDLE_TEST)[named], ac.at(named)
         if not np.any(is_idle) or np.all(is_idle):
             is_idle = np.zeros(is_idle.size, dtype=bool)
-    loaded = is_idle & (ac.resistance_ohm > IDLE_POWER_FACTOR * ac.impedance_ohm)
+    named = ac.said == LOCKED_TEST
+    most = UNLIKE * float(ac.inductance_h[named].max(initial=0.0)) or np.inf
+    loaded = np.where(
+        is_idle, ac.resistance_ohm > IDLE_POWER_FACTOR * ac.impedance_ohm, np.isnan(ac.said) & (ac.inductance_h > most)
+    )
     said = (f"{int(loaded.sum())} points of a loaded motor were not used.",) if loaded.any() else ()
-    return ac.at(is_idle & ~loaded), ac.at(~is_idle), said
+    return ac.at(is_idle & ~loaded), ac.at(~is_idle & ~loaded), said
 
 
 def stator_resistance(

@@ -6,13 +6,13 @@ import re
 
 from commissioner.errors import DataRefused
 from commissioner.identify.catalogue.sheet import KEYS, Value
+from commissioner.recordings.units import PER_MINUTE
 
 NUMBER = r"[-+]?(?:\d{1,3}(?:[ \u00a0\u202f]\d{3})+(?!\d)|\d+)(?:[.,]\d+)?(?:[eE][-+]?\d+)?|[-+]?[.,]\d+"
 PRINTED = re.compile(rf"\s*(?:ca\.?|~|≈)?\s*({NUMBER})\s*(.*)", re.DOTALL)
 UNITS = {
-    "w": 1.0, "kw": 1e3, "mw": 1e6, "hp": 745.7, "ps": 735.5, "cv": 735.5, "bhp": 745.7, "v": 1.0, "kv": 1e3, "vac": 1.0, "a": 1.0, "ma": 1e-3, "ka": 1e3,
-    "hz": 1.0, "1/min": 1.0, "rpm": 1.0, "min-1": 1.0, "min^-1": 1.0, "u/min": 1.0, "r/min": 1.0, "tr/min": 1.0, "giri/min": 1.0, "/min": 1.0,
-    "min⁻¹": 1.0, "nm": 1.0, "knm": 1e3, "kgm": 9.80665, "kpm": 9.80665, "kgfm": 9.80665, "danm": 10.0, "lbft": 1.35582, "lb-ft": 1.35582,
+    "w": 1.0, "kw": 1e3, "mw": 1e6, "hp": 745.7, "ps": 735.5, "cv": 735.5, "km": 735.5, "bg": 735.5, "bhp": 745.7, "v": 1.0, "kv": 1e3, "vac": 1.0, "a": 1.0, "ma": 1e-3, "ka": 1e3,
+    "hz": 1.0, **dict.fromkeys(PER_MINUTE, 1.0), "nm": 1.0, "knm": 1e3, "kgm": 9.80665, "kpm": 9.80665, "kgfm": 9.80665, "danm": 10.0, "lbft": 1.35582, "lb-ft": 1.35582,
     "ftlb": 1.35582, "ohm": 1.0, "ω": 1.0, "mohm": 1e-3, "mω": 1e-3, "kgm2": 1.0, "kgm²": 1.0, "kgm^2": 1.0, "gm2": 1e-3, "gm²": 1e-3, "kgcm2": 1e-4, "kgcm²": 1e-4, "lbft2": 0.0421401, "lbft²": 0.0421401, "%": 0.01,
     "pu": 1.0, "p.u.": 1.0, "degc": 1.0, "°c": 1.0, "c": 1.0, "degf": 5.0 / 9.0, "°f": 5.0 / 9.0, "f": 5.0 / 9.0, "k": 1.0, "": 1.0, "-": 1.0, "x": 1.0, "xin": 1.0, "xmn": 1.0,
 }  # fmt: skip
@@ -20,8 +20,8 @@ UNITS = {
 OFFSETS = dict.fromkeys(("degf", "°f", "f"), -160.0 / 9.0) | {"k": -273.15}
 """Added behind the factor: of degrees Fahrenheit and kelvin."""
 MEASURES = {
-    "W": {"w", "kw", "mw", "hp", "ps", "cv", "bhp"}, "V": {"v", "kv", "vac"}, "A": {"a", "ma", "ka"}, "Hz": {"hz"},
-    "1/min": {"1/min", "rpm", "min-1", "min^-1", "u/min", "r/min", "tr/min", "giri/min", "/min", "min⁻¹"},
+    "W": {"w", "kw", "mw", "hp", "ps", "cv", "km", "bg", "bhp"}, "V": {"v", "kv", "vac"}, "A": {"a", "ma", "ka"}, "Hz": {"hz"},
+    "1/min": PER_MINUTE,
     "N m": {"nm", "knm", "kgm", "kpm", "kgfm", "danm", "lbft", "lb-ft", "ftlb"}, "ohm": {"ohm", "ω", "mohm", "mω"},
     "kg m2": {"kgm2", "kgm²", "kgm^2", "gm2", "gm²", "kgcm2", "kgcm²", "lbft2", "lbft²"}, "degC": {"degc", "°c", "c", "degf", "°f", "f", "k"}, "": {"%", "pu", "p.u.", "x", "xin", "xmn"},
 }  # fmt: skip

@@ -26,8 +26,8 @@ NAMES = {
     "power_factor": rf"{_RATED}(?:powerfactor|leistungsfaktor|pf|cos(?:phi)?[nr]?){_LOAD}",
     "efficiency": rf"{_RATED}(?:efficiency|wirkungsgrad|eff|eta[nr]?){_LOAD}",
     "rated_torque_nm": rf"{_RATED}(?:torque|moment|drehmoment)|[mtc][nr]?",
-    "starting_current": rf"(?:{_START}(?:current|strom)|i(?:a|st|s|lr|l|anl)|lra|lrc){_OVER}|i[dp]/(?:in|ir|i)",
-    "starting_torque": rf"(?:{_START}(?:torque|moment|drehmoment)|[mtc](?:a|st|lr|l|d)|cs|lrt){_OVER}|[mtc]p/[mtc](?:n|r)?",
+    "starting_current": rf"(?:{_START}(?:current|strom)|i(?:a|st|s|lr|l|anl)|lra|lrc){_OVER}|i[dp]/(?:in|ir|i)|ir/in",
+    "starting_torque": rf"(?:{_START}(?:torque|moment|drehmoment)|[mtc](?:a|st|lr|l|d)|cs|lrt|ts){_OVER}|[mtc]p/[mtc](?:n|r)?|[mtc]r/[mtc]n",
     "breakdown_torque": rf"(?:(?:breakdown|pullout|maximum|max|kipp)(?:torque|moment|drehmoment)|[mtc](?:k|max|b|m)|bdt){_OVER}",
     "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mt](?:s|u|pu)|c(?:u|pu)){_OVER}",
     "no_load_current_a": r"(?:noload|idle|leerlauf)(?:current|strom)|i0",
@@ -88,7 +88,8 @@ def _before_symbol(name: str) -> str | None:
     words, _, symbol = re.sub(r"cos\s+(?=\S)", "cos", name.strip()).rpartition(" ")
     key = _in_any_order(words)
     is_abroad = key in ABSOLUTE and words != translated(words) and _OF_RATED.fullmatch(symbol) is not None
-    return key if is_abroad or key == _matched(symbol) else None
+    is_so = key in _PATTERNS and _PATTERNS[key].fullmatch(_letters(symbol)) is not None
+    return key if is_abroad or is_so or key == _matched(symbol) else None
 
 
 def _over_rated(name: str) -> str | None:
@@ -121,7 +122,7 @@ def unit_of(name: str) -> str:
     if (ending := _SUFFIX.search(name.strip())) is not None:
         return {"pct": "%", "percent": "%", "kg_m2": "kgm2"}.get(ending[1].lower(), ending[1])
     if (bare := re.search(r"[\[(]\s*([^\])]*)[\])]\s*$", name)) is not None:
-        return "" if _is_load(bare[1]) else bare[1].strip()
+        return "" if _is_load(bare[1]) or _OF_RATED.fullmatch(bare[1].strip()) else bare[1].strip()
     found = unbracketed(unit_in(name))
     return (
         "" if found != unit_in(name).strip() or re.fullmatch(r"[A-Za-z]_?[A-Za-z]+|\d", found) or not found else found

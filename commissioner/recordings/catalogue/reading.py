@@ -52,6 +52,8 @@ PAIR = re.compile(
 """`230/400 V`, `400/690 V D/Y`, `400 V D / 690 V Y`."""
 _SAID_BESIDE = re.compile(r"\s*\([^()]*=[^()]*\)$")
 """Another value behind a unit: `(GD² = 0.176)`."""
+_DECIMAL = re.compile(r"(?<![\d.,])(?:0([.,])\d+|\d+([.,])(?!\d{3}(?!\d))\d+)(?![.,]?\d)")
+"""A number whose mark can only be a decimal one."""
 _SHARE = r"\d+(?:[.,]\d+)?"
 AT_LOADS = re.compile(rf"^\s*({_SHARE}(?:\s*%?(?:\s*[;/|–-]\s*|\s+){_SHARE}){{1,4}})\s*(%?)[\s;]*$")
 """Values at several loads in one cell."""
@@ -220,7 +222,7 @@ def _sheet(entries: Sequence[Entry], source: str) -> Sheet:
         {}, connection if connection in ("star", "delta") else "", words.get("design_class", "").upper()[-1:], source
     )
     unsaid: list[str] = []
-    read: list[str] = []
+    entries, read = _without_thousands(entries)
     for entry in entries:
         if entry.key in words:
             continue
@@ -229,6 +231,21 @@ def _sheet(entries: Sequence[Entry], source: str) -> Sheet:
     remarks = tuple(f"{name}: not said between which terminals it was measured, not used" for name in unsaid)
     remarks += tuple(read)
     return replace(_with_unit_of_power(sheet, entries), remarks=(*sheet.remarks, *remarks))
+
+
+def _without_thousands(entries: Sequence[Entry]) -> tuple[list[Entry], list[str]]:
+    """(the entries without marks between thousands, remarks): a mark before three digits is none for decimals where all others that can
+    only be one are the other mark (`1,435 rpm` beside `4.8 A`)."""
+    marks = {found[1] or found[2] for entry in entries for found in _DECIMAL.finditer(entry.printed)}
+    if len(marks) != 1:
+        return list(entries), []
+    (mark,) = marks
+    grouped = re.compile(rf"(?<![\d.,])([1-9]\d{{0,2}}){re.escape('.' if mark == ',' else ',')}(?=\d{{3}}(?![\d.,]))")
+    out = [replace(entry, printed=grouped.sub(r"\1", entry.printed)) for entry in entries]
+    pairs = [(old, new) for old, new in zip(entries, out, strict=True) if old != new]
+    return out, [
+        f"{old.name} {old.printed}: taken as {new.printed}, for decimals stand behind `{mark}`" for old, new in pairs
+    ]
 
 
 def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:

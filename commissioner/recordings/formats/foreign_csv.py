@@ -32,7 +32,8 @@ from commissioner.recordings.reading.preface import (
     units_said,
 )
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
-from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, unknown
+from commissioner.recordings.reading.said_tests import codes, in_runs, is_title, require_one_motor, unknown
+from commissioner.recordings.sheet_names import is_sheet
 from commissioner.recordings.sheets.barred import unbarred
 from commissioner.recordings.sheets.indexed import in_rows
 from commissioner.recordings.sheets.upright import upright
@@ -41,6 +42,8 @@ from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
 SAMPLED_ROWS = 200
+MOST_POINTS = 1000
+"""Rows of a test sheet in which a second motor is looked for."""
 _STATISTIC = re.compile(
     r"(?:mean|average|avg|mittelwert|mittel|moyenne|media|promedio|max(?:imum|imo|imal)?|min(?:imum|imo|imal)?|rms|std(?:dev)?|sum|summe)[.: ]*",
     re.IGNORECASE,
@@ -137,6 +140,9 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     columns = []
     filled = np.zeros(table.num_rows, dtype=np.int64)
     below = np.zeros(table.num_rows, dtype=bool)
+    if is_sheet(layout.names):
+        for name, column in zip(layout.names, table.columns, strict=True):
+            require_one_motor(name, [str(cell) for cell in column.slice(0, MOST_POINTS).to_pylist()], source)
     for name, column in zip(layout.names, table.columns, strict=True):
         values, wrong = to_numbers(column, marks, source)
         filled += np.isfinite(values)

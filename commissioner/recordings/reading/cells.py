@@ -34,6 +34,8 @@ CLOCK = re.compile(
 """A time of day, with a date before it or without; minutes and seconds where a fraction says that they are (`59:59.98`)."""
 
 
+NO_READING = 9.9e37
+"""What instruments print for infinity; 9.91E37 for no number (SCPI-1999, volume 1, 7.2.1.4 and 7.2.1.5)."""
 LOOKED_AT, LEAST_GROUPED = 1024, 8
 """Cells of a column, and how many of them must look like thousands to be asked for: of shortest decimals one in ten has fewer digits."""
 
@@ -160,7 +162,7 @@ def _not_between_thousands(mark: str) -> str:
 
 def _cast(text: pa.Array) -> Signal:
     values = pc.cast(text, pa.float64()).to_numpy(zero_copy_only=False)
-    return np.where(np.isfinite(values), values, np.nan)
+    return np.where(np.abs(values) < NO_READING, values, np.nan)
 
 
 def _one_by_one(text: pa.Array, marks: Marks, source: str) -> tuple[Signal, list[str]]:
@@ -175,7 +177,7 @@ def _one_by_one(text: pa.Array, marks: Marks, source: str) -> tuple[Signal, list
             values[k] = clock_seconds(clock, is_month_first) if clock else _number(cell, marks, source)
         except ValueError:
             wrong.append(cell)
-    values[~np.isfinite(values)] = np.nan
+    values[~(np.abs(values) < NO_READING)] = np.nan
     return values, wrong
 
 

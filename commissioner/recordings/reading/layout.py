@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,9 @@ LEAST_WITH_TEXT = 8
 LABELS = frozenset({"label", "labels", "tracename", "channelname", "channellabel", "signalname", "name", "source"})
 UNITS = frozenset({"verticalunits", "verticalunit", "vunit", "vunits", "yunit", "yunitlabel", "unit", "units"})
 """Keys of rows in a preface that hold a name or a unit of every column."""
+
+_COUNT = re.compile(r"^[\d.,]+\s*(?=\D)")
+"""Of a unit that is so many others (`100 ns`, `0.1 ms`)."""
 
 Row = list[str]
 
@@ -107,7 +111,8 @@ def layout_of(text: str, source: str) -> Layout:
             if len(rows) == 1 and k > 0 and _are_numbers(_rows(lines[k - 1 : k], separator)):
                 continue  # the last row of a table with a spoilt one
             if _are_numbers([row[skip:] for row in rows]) and _go_on(rows[0], lines[k:], separator):
-                return _layout(lines, k, separator, skip, [row[skip:] for row in rows], source)
+                rows = [row[skip:] for row in rows]
+                return _layout(lines, k if skip else _begun(lines, k, separator, rows), separator, skip, rows, source)
     raise _without_rows([line.text for line in lines], source)
 
 
@@ -177,6 +182,39 @@ def _go_on(first: Row, lines: Sequence[_Line], separator: str) -> bool:
     return len({tuple(is_numeric(c) for c in row) for row in rows}) == 1
 
 
+def _begun(lines: Sequence[_Line], first: int, separator: str, rows: Sequence[Row]) -> int:
+    """Where a table with texts begins: the rows above the ones alike fit its columns, though a text stands in some of them only (a test
+    named once for its points, a plate beside them)."""
+    numbers = [any(map(is_number, cells)) for cells in zip(*rows, strict=True)]
+    begins = first
+    while not all(numbers) and begins > 0:
+        row = split(lines[begins - 1].text, separator)
+        kinds = list(zip(row, numbers, strict=False))
+        is_fit = len(row) <= len(rows[0]) and sum(of_numbers and is_number(cell) for cell, of_numbers in kinds) > 1
+        if not is_fit or any(of_numbers and not is_numeric(cell) for cell, of_numbers in kinds):
+            break
+        begins -= 1
+    above = [split(line.text, separator) for line in lines[max(begins - 2, 0) : begins]]
+    return begins if any(_known(row) > 1 for row in above) else first
+
+
+def _require_one_table(above: Sequence[Row], source: str) -> None:
+    """DataRefused: rows of numbers stand below names above the last names: they would be lost, or read under the others'."""
+    numbers = [
+        k
+        for k, row in enumerate(above)
+        if row and is_number(row[0]) and sum(map(is_number, row)) > 1 and all(map(is_numeric, row))
+    ]
+    named = next((k for k, row in enumerate(above[: numbers[-1]]) if _known(row) > 1), None) if numbers else None
+    lost = next((above[k] for k in numbers if named is not None and k > named), None)
+    if lost is not None:
+        raise DataRefused(
+            f"{source}: rows of numbers stand above the table that begins behind them, as {', '.join(lost)[:60]}", step="read recording",
+            value=f"{len(numbers)} rows", limit="one table, its names above all its rows",
+            remedy="give each table as a file of its own, or all rows below one line of names (with a column `test`)",
+        )  # fmt: skip
+
+
 def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows: Sequence[Row], source: str) -> Layout:
     width = len(rows[0])
     if width > MAX_COLUMNS:
@@ -194,6 +232,7 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
             separator, lines[first].start, named[:width],
             (beside.get("horizontal units", "s"), beside.get("vertical units", ""), *("",) * (width - 2)), tuple(preface), skip,
         )  # fmt: skip
+    _require_one_table(above, source)
     names, units, used, is_split = _names(above, width)
     if not is_split:
         _require_columns(above[len(above) - used :], rows, source)
@@ -327,7 +366,11 @@ def _is_units(row: Row) -> bool:
     it and half are known: one that is not known is asked for where its column is needed."""
     said = [cell for cell in row if cell]
     others = [cell for cell in said if not (is_unit(cell) or is_number(cell))]
-    begins = len(said) > 2 and (unit := read_unit(said[0])) is not None and unit.measures in {"time", "frequency"}
+    begins = (
+        len(said) > 2
+        and (unit := read_unit(_COUNT.sub("", said[0]))) is not None
+        and unit.measures in {"time", "frequency"}
+    )
     are_few = 2 * len(others) <= len(said) or any("%" in cell for cell in others)
     return (
         len(said) >= 1

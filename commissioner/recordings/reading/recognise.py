@@ -47,6 +47,10 @@ SHOWN = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency":
          "torque": "Nm", "speed": "rad/s"}  # fmt: skip
 SAME_TIME = 0.01
 """Of a sample period, by which two columns of one time may differ."""
+INDEX, LEAST_ROWS = "__index_level_0__", 16
+"""What pandas calls an index without a name in Parquet (in CSV nothing), and rows from which on its steps tell what it is."""
+SAME_VALUE = 0.05
+"""Of the largest value, by which two columns of one current or voltage may differ: one of them was rounded, or filtered."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
 """What an instrument calls a channel that nobody has named."""
 _QUANTITY = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D\S*)?")
@@ -67,6 +71,7 @@ def recognise(
 ) -> Recognised:  # fmt: skip
     """The columns by the contract's names where they mean one, else by their own; see the module. `said`: units that stand once above
     the columns."""
+    names, indexed = _with_index(names, values)
     own, units = units, [unit or _said_once(name, said) for name, unit in zip(names, units, strict=True)]
     names = [f"{n} [{u}]" if is_temperature(u) and not unit_in(n) else n for n, u in zip(names, units, strict=True)]
     meant = in_company(names)
@@ -76,7 +81,7 @@ def recognise(
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
     meaning: str | None
-    readings, notes, unnamed, rms = [], [], [], []
+    readings, notes, unnamed, rms = [], indexed, [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
         name = names[k]
@@ -95,6 +100,8 @@ def recognise(
         if meaning in columns:
             if meaning == "time_s":
                 _require_one_time(names, (place[meaning], k), (columns[meaning], factor * values[k]), source)
+            elif name not in targets and names[place[meaning]] not in (*targets, *CONTRACT_COLUMNS):
+                _require_alike(names, (place[meaning], k), (columns[meaning], factor * values[k]), meaning, source)
             notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
             meaning = None
         if meaning is None:
@@ -118,6 +125,23 @@ def recognise(
     )
     notes += _units_apart(readings, said, targets, source)
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _with_index(names: Sequence[str], values: Sequence[Signal]) -> tuple[Sequence[str], list[ReadingNote]]:
+    """The names with that of a time for an index, as pandas saves it, where no other is a time, and it rises evenly and not by ones."""
+    place = next((k for k, name in enumerate(names) if name == INDEX or (not name and k == 0)), None)
+    if place is None or values[place].size < LEAST_ROWS or any(map(_is_time, names)):
+        return names, []
+    steps = np.diff(values[place])
+    usual = float(np.median(steps))
+    if not (usual > 0.0 and usual % 1.0 and np.all(np.abs(steps - usual) < usual / 2.0)):
+        return names, []
+    what = f"column {place + 1} has no name and rises by {usual:.4g} from row to row: taken as the time in seconds"
+    return [*names[:place], "time_s", *names[place + 1 :]], [ReadingNote("index", what)]
+
+
+def _is_time(name: str) -> bool:
+    return meaning_of(name) == "time_s"
 
 
 def _said_once(name: str, said: Mapping[str, UnitSaid]) -> str:
@@ -168,6 +192,23 @@ def _require_one_time(names: Sequence[str], places: tuple[int, int], times: tupl
             f"{source}: {first} and {second} are two times, {apart:.4g} s apart", step="read the time", value=f"{apart / steps[0]:.3g} of a sample period",
             limit=f"{SAME_TIME} of one: all channels sampled at one time", remedy="resample all channels to one time column and leave "
             "the others out; where both mean the same, take one as ignore by --map",
+        )  # fmt: skip
+
+
+def _require_alike(
+    names: Sequence[str], places: tuple[int, int], values: tuple[Signal, Signal], meaning: str, source: str
+) -> None:
+    """DataRefused: two columns mean the same current, voltage or power and differ, as of two motors, or of the mains and the motor."""
+    if not meaning.startswith(("current_", "voltage_", "power_")) or values[0].size != values[1].size:
+        return
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(values[1] - values[0]) / np.nanmax(np.abs(values[0]), initial=1e-12)
+    if float(np.nanmax(apart, initial=0.0)) > SAME_VALUE:
+        first, second = (f"{names[k]} (column {k + 1})" for k in places)
+        raise DataRefused(
+            f"{source}: {first} and {second} both mean {meaning} and differ", step="recognise columns",
+            value=f"{float(np.nanmax(apart)):.3g} of the largest value", limit=f"{SAME_VALUE}, or one column",
+            remedy=f"take the column that is not meant out of the file, or as ignore: {HOW_TO_MAP}",
         )  # fmt: skip
 
 
@@ -233,6 +274,8 @@ def _factor(name: str, unit: str, meaning: str, source: str) -> float:
     """To SI. DataRefused: mega or milli, a unit of something else, one that needs a factor which is not given, or none that is
     known."""
     known, bare = read_unit(unit), unbracketed(unit).lower()
+    if meaning == "power_factor" and bare == "%":
+        return 0.01
     if known is None and bare in FOREIGN:
         raise _refused(name, unit, meaning, source, "a unit that needs a factor")
     if known is None and (bare in NO_UNIT or is_remark(bare)):

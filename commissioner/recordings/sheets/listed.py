@@ -13,9 +13,9 @@ from commissioner.recordings.reading.layout import split
 from commissioner.recordings.words import folded
 
 NAME, SYMBOL, UNIT, VALUE, ASIDE = "name", "symbol", "unit", "value", "aside"
-QUANTITIES = "parameter quantity name item variable measurand grosse messgrosse kenngrosse grandeur magnitud grandezza"
-UNITS = "unit units einheit einheiten unite unites unidad unidades unita"
-VALUES = "value values reading wert werte messwert valeur valeurs valor valore valori"
+QUANTITIES = "parameter quantity name item variable measurand grosse messgrosse kenngrosse grandeur magnitud grandezza grandeza parametr wielkosc"
+UNITS = "unit units einheit einheiten unite unites unidad unidades unita unidade jednostka birim"
+VALUES = "value values reading wert werte messwert valeur valeurs valor valores valore valori wartosc wartosci deger degerler"
 """What a column of each is called in a list as in a long table, without accents."""
 HEADS = {
     NAME: f"{QUANTITIES} parameters description designation characteristic property data kennwert bezeichnung benennung merkmal angabe "

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.reading.preface import SIGNS
 from commissioner.recordings.reading.said_tests import codes
 from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns
 from commissioner.recordings.sheets.indexed import is_symbol, symbol_of, tests_in
@@ -43,10 +44,15 @@ def upright(text: str) -> str | None:
 
 
 def _turned(lines: Sequence[str], mark: str) -> str | None:
-    said = [line for line in lines if line.startswith("#")]
     rows = [_cells(line, mark) for line in lines if not line.startswith("#")]
-    quantities = [one for row in rows if (one := _quantity(row))]
-    names = [one.name for one in quantities]
+    said = [line for line in lines if line.startswith("#")] + [
+        f"# {row[0]}" for row in rows if len(row) == 1 and SIGNS.match(row[0])
+    ]
+    every = [one for row in rows if (one := _quantity(row))]
+    names = [one.name for one in every]
+    taken = {k for of in tests_in(names).values() for k in of.values()}
+    aside = [one for k, one in enumerate(every) if taken and k not in taken and len(one.values) == 1]
+    quantities = [one for one in every if one not in aside]
     points = max((len(one.values) for one in quantities), default=0)
     is_certain = len(tests_in(names)) > 0 or (points > 1 and is_sheet(names))
     if not is_certain or any(len(one.values) != points for one in quantities):
@@ -64,6 +70,7 @@ def _turned(lines: Sequence[str], mark: str) -> str | None:
     between = mark if mark in ";\t" else "\t"
     body = [between.join(cells) for cells in (head, *zip(*columns, strict=True))]
     others = [f"# {row[0]}: {' '.join(row[1:])}" for row in rows if _is_beside(row, points)]
+    others += [f"# {one.name}: {one.values[0]} {one.unit}".rstrip() for one in aside]
     return "\n".join([*said, *others, *body]) + "\n"
 
 
@@ -81,6 +88,7 @@ def _spelt(lines: Sequence[str]) -> list[str]:
         if one.values:
             out.append(";".join((_called(one.names, titled), *filter(None, [one.unit]), *one.values)))
         else:
+            out += [f"# {name}" for name in one.names if SIGNS.match(name)]
             code = codes(one.names[:1])
             titled = float("nan") if code is None else float(code[0])
     return out

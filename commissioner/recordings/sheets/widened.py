@@ -24,7 +24,7 @@ CHANNEL = frozenset(
     f"{QUANTITIES} channel channelname channelid signal signalname variablename sensor tag tagname measurement metric series field kanal "
     "kanalname messkanal voie canal canale segnale senal variabile".split()
 )
-VALUE = frozenset(f"{VALUES} valores val data y".split())
+VALUE = frozenset(f"{VALUES} val data y".split())
 UNIT = frozenset(UNITS.split())
 POINT = frozenset(
     ("point", "row", "sample", "index", "no", "nr", "punkt", "messpunkt", "zeile", "test", "versuch", "prueba", "essai", "prova")

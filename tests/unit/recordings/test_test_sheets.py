@@ -101,7 +101,8 @@ def test_a_diagnosis_of_three_tests_says_that_nothing_is_left_over(tmp_path: Pat
     ("head", "row", "lacks"),
     [
         ("f,U,I,W1", "50,400,3,900", "power_w"),
-        ("f [Hz],U [V],I [A],cos phi", "50,400,3,0.2", "power_w"),
+        ("f [Hz],U [V],I [A],S [VA]", "50,400,3,2078", "power_w"),
+        ("U [V],I [A],cos phi", "50,3,0.2", "power_w"),
         ("f,U1,U2,U3,I,P", "50,231,231,231,3,400", "voltage_line_v"),
         ("Frecuencia (Hz),Tensión (V),Corriente (A)", "50,231,3", "power_w"),
     ],
@@ -199,7 +200,7 @@ def test_it_is_read_in_ohm_per_star_phase(tmp_path: Path, above: str, name: str,
 def test_a_resistance_that_leaves_no_rotor_is_refused(tmp_path: Path, ohm: str) -> None:
     path = tmp_path / "sheet.csv"
     path.write_text(f"{HEAD},R_UV\nno load,60,208,8.17,420,{ohm}\nlocked rotor,15,25,27.9,920,{ohm}\n")
-    with pytest.raises(DataRefused, match="winding_resistance_uv_ohm (does not fit the points|makes more copper loss)"):
+    with pytest.raises(DataRefused, match=r"winding_resistance_uv_ohm (does not fit the points|makes more copper loss)"):
         identify_any(IdentifyRequest((path,)))
 
 
@@ -400,5 +401,7 @@ def test_a_row_of_a_series_that_is_called_by_another_tests_name_is_refused(tmp_p
     path = tmp_path / "sheet.csv"
     text = in_one_table(True, False, (120.0, 200.0, 280.0, 340.0, 400.0, 430.0))
     path.write_text(text.replace("no load,50,280", "locked rotor,50,280"), encoding="utf-8")
-    with pytest.raises(DataRefused, match=r"280 V and 4\.51.* A is called locked rotor and is no load by its inductance"):
+    with pytest.raises(
+        DataRefused, match=r"280 V and 4\.51.* A is called locked rotor and is no load by its inductance"
+    ):
         diagnose(DiagnoseRequest((path,)))
