@@ -290,7 +290,7 @@ def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Arra
 @dataclass(frozen=True)
 class Fit:
     """`rest`: whitened residual of the fitted part, `jacobian` where it ended (columns, samples); `held`: chi-square of the held-out part.
-    `by_noise`: what the input's noise makes of the Jacobian's Gram matrix, `aside`: a shift by it that is known and not taken off; both from
+    `by_noise`: what the input's noise makes of the Jacobian's Gram matrix, `aside` (k, columns): by how much it may draw them aside besides; both from
     `unbiased`, nothing before."""
 
     machine: Machine
@@ -319,27 +319,32 @@ class Fit:
 
     def covariance(self) -> Array:
         """Of the columns' numbers in fit coordinates, widened by what is left."""
-        own = self._told().covariance * self.scale
-        return np.asarray(own + np.outer(self.aside, self.aside))
+        own, aside = self.told().covariance * self.scale, np.atleast_2d(self.aside)
+        return np.asarray(own + aside.T @ aside)
 
     def not_told(self) -> tuple[str, ...]:
         """Of the four numbers those that noise of the input moves more than the motor does, by more than `LEAST_OPEN`."""
-        wide = np.sqrt(self._told().open.diagonal() * self.scale) > LEAST_OPEN
+        wide = np.sqrt(self.told().open.diagonal() * self.scale) > LEAST_OPEN
         return tuple(
             NAMES[c.index]
             for c, x in zip(self.columns, wide, strict=True)
             if x and c.kind == "p" and c.index in AT_FOUR
         )
 
-    def _told(self) -> Told:
+    def told(self) -> Told:
+        """What the sensitivities tell of the columns' numbers, nothing else left."""
         return told(self.jacobian @ self.jacobian.T, self.by_noise)
+
+    def place(self, name: str) -> int:
+        """Of a number among the columns; ValueError where it is not free."""
+        return self.columns.index(Column("p", AT[name]))
 
     def std(self, name: str) -> float:
         """Of a number in its own unit; 0 where it is not free."""
-        place = [j for j, c in enumerate(self.columns) if c.kind == "p" and c.index == AT[name]]
-        if not place:
+        if Column("p", AT[name]) not in self.columns:
             return 0.0
-        return float(np.sqrt(self.covariance()[place[0], place[0]]) * self.machine.slope()[AT[name]])
+        place = self.place(name)
+        return float(np.sqrt(self.covariance()[place, place]) * self.machine.slope()[AT[name]])
 
 
 def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots: bool = False) -> tuple[Column, ...]:

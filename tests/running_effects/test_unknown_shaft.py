@@ -57,6 +57,7 @@ def test_what_a_steady_load_leaves_open_is_said(steady: tuple[Problem, Fit]) -> 
     assert all(off[name] < 3.0 * fit.std(name) for name in FOUR)
     assert set(fit.not_told()) == {"stator_resistance", "rotor_resistance"}
     assert "stator resistance and rotor resistance" in next(not_told(fit))
+    assert fit.std("rotor_resistance") > 0.3 * fit.machine.value("rotor_resistance"), "what the plate tells is left"
     assert fit.std("leakage_inductance") < 0.02 * fit.machine.value("leakage_inductance")
 
 
