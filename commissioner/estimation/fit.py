@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from commissioner.errors import DataRefused
 from commissioner.estimation.cancelling import ask_for_time
 from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
-from commissioner.estimation.noise import Noise, plain_noise, through_machine
-from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES, SHAPES
-from commissioner.estimation.record import SMOOTH_S, Record, Window, between, first_part, smoothed
+from commissioner.estimation.noise import Noise, plain_noise
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES
 from commissioner.estimation.record import STATES as RECORD_STATES
+from commissioner.estimation.record import Record, Window, first_part
+from commissioner.estimation.told import Told, inverse, told
 
 Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
@@ -34,9 +34,9 @@ MOST_STEPS = 50
 gained by whatever cause was tried next."""
 SLOW = 0.3
 """Of the last step's gain: a step that gains more asks for a new Jacobian."""
-MOST_SHIFTED = 0.05
-"""Of chi-square: what a shift by noise may add. One that adds more is drawn along a load whose knots the recording hardly tells: under a belt
-it left 6.4 times the noise of a healthy motor that had been fitted to the noise, and called it unexplained."""
+LEAST_OPEN = 0.05
+"""Standard deviation of a logarithm that is worth a word."""
+AT_FOUR = frozenset(AT[n] for n in FOUR)
 EDGE = 2
 """Samples at each end of a window that an interpolated delay has no neighbours for."""
 
@@ -289,7 +289,9 @@ def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Arra
 
 @dataclass(frozen=True)
 class Fit:
-    """`rest`: whitened residual of the fitted part, `jacobian` where it ended (columns, samples); `held`: chi-square of the held-out part."""
+    """`rest`: whitened residual of the fitted part, `jacobian` where it ended (columns, samples); `held`: chi-square of the held-out part.
+    `by_noise`: what the input's noise makes of the Jacobian's Gram matrix, `aside` (k, columns): by how much it may draw them aside besides; both from
+    `unbiased`, nothing before."""
 
     machine: Machine
     columns: tuple[Column, ...]
@@ -298,6 +300,8 @@ class Fit:
     jacobian: Array
     held: float
     held_count: int
+    by_noise: Array | float = 0.0
+    aside: Array | float = 0.0
 
     @property
     def count(self) -> int:
@@ -309,24 +313,38 @@ class Fit:
         """Chi-square a sample, never below 1."""
         return max(self.chi2 / max(self.count - len(self.columns), 1), 1.0)
 
+    def influence(self) -> Array:
+        """By how much of its number each column's gradient moves the fit: the inverse of the Gram matrix."""
+        return inverse(self.jacobian @ self.jacobian.T)
+
     def covariance(self) -> Array:
         """Of the columns' numbers in fit coordinates, widened by what is left."""
-        return _inverse(self.jacobian @ self.jacobian.T) * self.scale
+        own, aside = self.told().covariance * self.scale, np.atleast_2d(self.aside)
+        return np.asarray(own + aside.T @ aside)
+
+    def not_told(self) -> tuple[str, ...]:
+        """Of the four numbers those that noise of the input moves more than the motor does, by more than `LEAST_OPEN`."""
+        wide = np.sqrt(self.told().open.diagonal() * self.scale) > LEAST_OPEN
+        return tuple(
+            NAMES[c.index]
+            for c, x in zip(self.columns, wide, strict=True)
+            if x and c.kind == "p" and c.index in AT_FOUR
+        )
+
+    def told(self) -> Told:
+        """What the sensitivities tell of the columns' numbers, nothing else left."""
+        return told(self.jacobian @ self.jacobian.T, self.by_noise)
+
+    def place(self, name: str) -> int:
+        """Of a number among the columns; ValueError where it is not free."""
+        return self.columns.index(Column("p", AT[name]))
 
     def std(self, name: str) -> float:
         """Of a number in its own unit; 0 where it is not free."""
-        place = [j for j, c in enumerate(self.columns) if c.kind == "p" and c.index == AT[name]]
-        if not place:
+        if Column("p", AT[name]) not in self.columns:
             return 0.0
-        return float(np.sqrt(self.covariance()[place[0], place[0]]) * self.machine.slope()[AT[name]])
-
-
-def _inverse(gram: Array) -> Array:
-    """In units of each column's size, so that none is lost beside an enormous one; a column that does nothing makes no singular matrix."""
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
-    scaled = gram / np.outer(size, size)
-    scaled += np.diag(1e-12 * np.maximum(np.diag(scaled), 1e-30))
-    return np.asarray(np.linalg.pinv(scaled, hermitian=True) / np.outer(size, size))
+        place = self.place(name)
+        return float(np.sqrt(self.covariance()[place, place]) * self.machine.slope()[AT[name]])
 
 
 def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots: bool = False) -> tuple[Column, ...]:
@@ -426,71 +444,3 @@ def refine(
 def refreshed(problem: Problem, fit: Fit) -> Fit:
     """The same fit with the Jacobian of where it ended."""
     return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
-
-
-def _input_noise(problem: Problem, rng: np.random.Generator) -> list[tuple[Array, Array]]:
-    """Drawn for each window: noise of the voltage (n, 2), and of the electrical speed as it is after smoothing (n,)."""
-    record, drawn = problem.record, []
-    for w in record.windows:
-        volts = np.stack([record.sigma_v * rng.standard_normal(w.count) for _ in range(2)], axis=1)
-        speed = np.zeros(w.count)
-        if record.sigma_w:
-            speed = smoothed(record.sigma_w * rng.standard_normal(w.count), SMOOTH_S, 0, problem.period)
-        drawn.append((volts, speed))
-    return drawn
-
-
-def _shaken(problem: Problem, drawn: Sequence[tuple[Array, Array]], sign: float) -> Problem:
-    """The same currents with noise added to what drives the machine."""
-    noisy = []
-    for w, (volts, speed) in zip(problem.record.windows, drawn, strict=True):
-        turning = w.speed.copy()
-        turning[:, 0] += sign * between(speed)
-        added = np.stack([between(volts[:, k]) for k in range(2)], axis=1)
-        noisy.append(replace(w, voltage=w.voltage + sign * added, speed=turning))
-    return replace(problem, record=replace(problem.record, windows=tuple(noisy)))
-
-
-def unbiased(problem: Problem, fit: Fit, seed: int = 6) -> Fit:
-    """The fit less what the noise of voltage and speed does to its numbers.
-
-    An input that is noisy itself draws a fit aside by the square of its noise: L_sigma of a motor without a start by 0.5 to 0.8 %, four
-    standard deviations. The fitted machine's own currents are fitted with noise of that size added to the input, once with either
-    sign: what the two steps have in common is taken off. Numbers that only shape a law stay: along their valley no step is straight (simulation extrapolation, Cook and Stefanski 1994, DOI 10.1080/01621459.1994.10476871).
-    """
-    runs = zip(problem.record.windows, simulate(problem, fit.machine), strict=True)
-    own = tuple(replace(w, current=run) for w, (run, _) in runs)
-    ideal = replace(problem, record=replace(problem.record, windows=own))
-    drawn = _input_noise(problem, np.random.default_rng(seed))
-    columns = tuple(c for c in fit.columns if c.kind != "p" or c.index not in SHAPES)
-    drawn_aside = np.zeros(len(columns))
-    for sign in (1.0, -1.0):
-        noisy = _shaken(ideal, drawn, sign)
-        along = jacobian(noisy, fit.machine, columns)
-        rest = fitted_part(noisy, residuals(noisy, fit.machine))
-        drawn_aside += 0.5 * _inverse(along @ along.T) @ (along @ rest)
-    logarithms = [abs(x) for c, x in zip(columns, drawn_aside, strict=True) if c.kind == "p" and c.index in LOGARITHMIC]
-    if not np.isfinite(drawn_aside).all() or max(logarithms, default=0.0) > LARGEST_STEP:
-        return fit
-    moved = fit.machine.moved(columns, -drawn_aside)
-    rest = fitted_part(problem, residuals(problem, moved))
-    return replace(fit, machine=moved) if rest @ rest < (1.0 + MOST_SHIFTED) * fit.chi2 else fit
-
-
-def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:
-    """The same problem, weighted by what noise of voltage, speed and current leaves in this machine's residual."""
-    record = problem.record
-    rng = np.random.default_rng(seed)
-    noisy = _shaken(problem, _input_noise(problem, rng), 1.0)
-    clean = replace(machine, theta=machine.theta.copy())
-    plain, moved = (
-        simulate(problem, clean),
-        simulate(noisy, clean),
-    )
-    shown = np.concatenate([(b[0] - a[0])[:, :2] for a, b in zip(plain, moved, strict=True)])
-    if not np.isfinite(shown).all():
-        raise DataRefused(
-            "the fitted machine runs away from its own voltage", step="fit", value="no finite current", limit="a stable machine",
-            remedy="check the plate's rated values and the scale of voltages and currents",
-        )  # fmt: skip
-    return replace(problem, noise=through_machine(shown, record.sigma_a, record.has_zero, rng))

@@ -17,7 +17,7 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DiagnosisVerdict, RunningRecording
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.experiment import Experiment, next_experiment
-from commissioner.running.lack import Lack, lack_of_fit, rms_errors
+from commissioner.running.lack import Lack, lack_of_fit, not_told, rms_errors
 from commissioner.running.rules import RULES
 from commissioner.running.search import Found, Named, Step, search, so_far
 
@@ -126,7 +126,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     causes = tuple(sorted((_cause(found, one) for one in found.accepted), key=lambda c: -c.gain_share))
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain) if found.is_complete else UNFINISHED
-    remarks = list(record.remarks)
+    remarks = [*record.remarks, *not_told(found.fit)]
     if verdict == "unexplained" and causes and gain.explained_share < MOSTLY_GUESSES:
         guesses = ", ".join(c.name.replace("_", " ") for c in causes)
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")

@@ -23,17 +23,16 @@ from commissioner.estimation.fit import (
     problem_of,
     refine,
     simulate,
-    unbiased,
-    with_noise_of,
 )
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
+from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import BLOCK_S, STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
-from commissioner.running.lack import Lack, lack_of_fit
+from commissioner.running.lack import Lack, lack_of_fit, not_told
 from commissioner.running.nominal import with_shaft, with_speed
 
 Array = NDArray[np.float64]
@@ -107,7 +106,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     bound = {name: quantity.std for name, quantity in _parameters(four, noise_only / fit.scale).items()}
     return Identified(
         _parameters(four, covariance), bound, covariance, inertia, load, to_t_model(four, absolute), left,
-        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, late, inertia),
+        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, late, inertia, fit),
     )  # fmt: skip
 
 
@@ -146,8 +145,9 @@ def _covariance(problem: Problem, fit: Fit) -> Array:
     covariance = fit.covariance()
     block = max(round(BLOCK_S / problem.period), 1) * (3 if problem.noise.has_zero else 2)
     sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
-    scatter = np.sum((covariance / fit.scale @ sums) ** 2, axis=1)
-    wider = np.sqrt(np.maximum(scatter / np.maximum(covariance.diagonal(), 1e-300), 1.0))
+    moves = fit.influence()
+    scatter = np.sum((moves @ sums) ** 2, axis=1)
+    wider = np.sqrt(np.maximum(scatter / np.maximum(fit.scale * moves.diagonal(), 1e-300), 1.0))
     aside = _by_inertia(problem, fit)
     return np.asarray(covariance * np.outer(wider, wider) + np.outer(aside, aside))
 
@@ -157,7 +157,7 @@ def _by_inertia(problem: Problem, fit: Fit) -> Array:
     if not fit.machine.has_shaft or INERTIA in fit.columns or problem.record.plate.inertia_kg_m2 is not None:
         return np.zeros(len(fit.columns))
     along = jacobian(problem, fit.machine, (INERTIA,))[0]
-    return np.asarray(OF_ASSUMED_INERTIA * fit.covariance() / fit.scale @ (fit.jacobian @ along))
+    return np.asarray(OF_ASSUMED_INERTIA * fit.influence() @ (fit.jacobian @ along))
 
 
 def _of_four(fit: Fit, covariance: Array) -> Array:
@@ -264,8 +264,8 @@ def _flux(record: Record) -> float:
     return float(np.median(np.abs(tail)) / max(turn, 1e-9))
 
 
-def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | None) -> tuple[str, ...]:
-    out = list(record.remarks)
+def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | None, fit: Fit) -> tuple[str, ...]:
+    out = [*record.remarks, *not_told(fit)]
     worst = max(left.sigma, left.burst_sigma)
     if worst > LEAST_OVER_NOISE:
         out.append(

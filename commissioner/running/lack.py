@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.estimation.fit import Machine, Problem, residuals, simulate
+from commissioner.estimation.fit import Fit, Machine, Problem, residuals, simulate
 from commissioner.estimation.record import BLOCK_S, STATES
 
 Array = NDArray[np.float64]
@@ -61,3 +61,12 @@ def rms_errors(problem: Problem, machine: Machine) -> tuple[float, float]:
         fitted.append(error[:u])
         held.append(error[u:])
     return tuple(float(np.sqrt(np.mean(np.concatenate(x) ** 2))) if any(map(len, x)) else 0.0 for x in (fitted, held))  # type: ignore[return-value]
+
+
+def not_told(fit: Fit) -> Iterator[str]:
+    """A remark on the numbers that the recording leaves open."""
+    if names := " and ".join(n.replace("_", " ") for n in fit.not_told()):
+        yield (
+            f"Open: {names}. What these data seem to tell of it is mostly noise of the measured voltage, which the intervals allow for. "
+            "Record a start, a second load or the speed."
+        )

@@ -20,8 +20,8 @@ from commissioner.estimation.fit import (
     refine,
     residuals,
     with_knots_at,
-    with_noise_of,
 )
+from commissioner.estimation.noisy_input import with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import BLOCK_S, STATES, Record
 from commissioner.motor.nameplate import prior

@@ -17,9 +17,8 @@ from commissioner.estimation.fit import (
     jacobian,
     refine,
     refreshed,
-    unbiased,
-    with_noise_of,
 )
+from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record
 from commissioner.running.causes import CATALOGUE, always_tied

@@ -1,0 +1,48 @@
+"""What sensitivities tell that are noisy themselves: an independent draw of regressors decides."""
+
+import numpy as np
+import pytest
+
+from commissioner.estimation.told import inverse, told
+
+RNG = np.random.default_rng(3)
+COUNT, SIGMA = 400, 0.1
+STRONG = RNG.standard_normal(COUNT)
+
+
+def _fitted(weak: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Least squares of (1, 1) on two regressors that differ by `weak`, each seen with noise of `SIGMA`; its Gram matrix."""
+    ideal = np.stack([STRONG, STRONG + weak * np.cos(np.arange(COUNT))])
+    seen = ideal + SIGMA * rng.standard_normal(ideal.shape)
+    gram = seen @ seen.T
+    return np.linalg.solve(gram, seen @ (ideal.sum(axis=0) + rng.standard_normal(COUNT))), gram
+
+
+BY_NOISE = COUNT * SIGMA**2 * np.eye(2)
+
+
+def test_what_only_noise_tells_is_open_and_wide() -> None:
+    """Two regressors that are one: their difference is nothing but noise, and the plain error of it far too small."""
+    _, gram = _fitted(0.0, RNG)
+    told_of = told(gram, BY_NOISE)
+    along = np.array([1.0, -1.0]) / np.sqrt(2.0)
+    assert along @ told_of.covariance @ along > 50.0 * along @ inverse(gram) @ along
+    assert along @ told_of.open @ along == pytest.approx(along @ told_of.covariance @ along, rel=0.01)
+    across = np.array([1.0, 1.0]) / np.sqrt(2.0)
+    assert across @ told_of.open @ across < 0.01 * along @ told_of.open @ along
+
+
+def test_what_is_told_has_the_error_of_its_own_part() -> None:
+    """With three quarters of a direction its own, the spread about the truth is within the stated one, which the plain one is not told from."""
+    fits = [_fitted(0.35, np.random.default_rng(k)) for k in range(300)]
+    stated = np.sqrt(np.mean([np.diag(told(gram, BY_NOISE).covariance) for _, gram in fits], axis=0))
+    spread = np.std([found for found, _ in fits], axis=0)
+    assert np.all(stated > 0.95 * spread) and np.all(stated < 2.0 * spread)
+    assert not any(told(gram, BY_NOISE).open.any() for _, gram in fits)
+
+
+def test_without_noise_it_is_the_inverse() -> None:
+    """Also before anybody has asked."""
+    _, gram = _fitted(0.35, RNG)
+    assert told(gram, 0.0).covariance == pytest.approx(np.linalg.inv(gram), rel=1e-6)
+    assert told(gram, 1e-9 * gram).covariance == pytest.approx(np.linalg.inv(gram), rel=1e-5)
