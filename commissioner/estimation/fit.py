@@ -324,16 +324,22 @@ class Fit:
 
     def not_told(self) -> tuple[str, ...]:
         """Of the four numbers those that noise of the input moves more than the motor does, by more than `LEAST_OPEN`."""
-        wide = np.sqrt(self.told().open.diagonal() * self.scale) > LEAST_OPEN
+        return self._opened(self.told())
+
+    def told(self) -> Told:
+        """What the sensitivities tell of the columns' numbers, nothing else left. An open direction along which none of the four numbers
+        is wide (the inertia that a load's ripple tells) is as far off as any other."""
+        gram = self.jacobian @ self.jacobian.T
+        whole = told(gram, self.by_noise)
+        return whole if self._opened(whole) else told(gram, 0.0)
+
+    def _opened(self, whole: Told) -> tuple[str, ...]:
+        wide = np.sqrt(whole.open.diagonal() * self.scale) > LEAST_OPEN
         return tuple(
             NAMES[c.index]
             for c, x in zip(self.columns, wide, strict=True)
             if x and c.kind == "p" and c.index in AT_FOUR
         )
-
-    def told(self) -> Told:
-        """What the sensitivities tell of the columns' numbers, nothing else left."""
-        return told(self.jacobian @ self.jacobian.T, self.by_noise)
 
     def place(self, name: str) -> int:
         """Of a number among the columns; ValueError where it is not free."""

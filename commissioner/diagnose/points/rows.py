@@ -130,7 +130,7 @@ def of_direct_current(rows: Rows) -> NDArray[np.bool_]:
 def looks_idle(ac: Rows) -> NDArray[np.bool_] | None:
     """By the inductance of each row; None where all are of one kind."""
     inductance = np.maximum(ac.inductance_h, 1e-12)
-    if not inductance.size or inductance.max() < APART * inductance.min():
+    if not inductance.size or not inductance.max() >= APART * inductance.min():
         return None
     return np.asarray(inductance > np.sqrt(inductance.max() * inductance.min()))
 

@@ -200,7 +200,9 @@ def test_it_is_read_in_ohm_per_star_phase(tmp_path: Path, above: str, name: str,
 def test_a_resistance_that_leaves_no_rotor_is_refused(tmp_path: Path, ohm: str) -> None:
     path = tmp_path / "sheet.csv"
     path.write_text(f"{HEAD},R_UV\nno load,60,208,8.17,420,{ohm}\nlocked rotor,15,25,27.9,920,{ohm}\n")
-    with pytest.raises(DataRefused, match=r"winding_resistance_uv_ohm (does not fit the points|makes more copper loss)"):
+    with pytest.raises(
+        DataRefused, match=r"winding_resistance_uv_ohm (does not fit the points|makes more copper loss)"
+    ):
         identify_any(IdentifyRequest((path,)))
 
 
