@@ -149,6 +149,8 @@ def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) 
         n: {"value": v, "std": std if n == "rotor_resistance_ohm" else None} for n, v in values.items()
     }
     parameters["rotor_time_constant_s"] = {"value": circuit.rotor_time_constant_s, "std": None}
+    for name in ("magnetizing_inductance_h", "rotor_time_constant_s"):
+        parameters[name]["at_stator_flux_wb"] = found.flux_wb
     return {
         "outcome": "identified",
         "reason": "The circuit of a direct-current, a no-load and a locked-rotor test.",
