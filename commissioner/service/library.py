@@ -20,6 +20,7 @@ from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
 from commissioner.service.problems import Refusal, Unknown
 from commissioner.settings import CONFIG_FOLDER, MotorFile, ProcedureFile, load_motor, must_agree, read_toml
+from commissioner.text import did_you_mean
 from commissioner.validation import requirement
 
 SIMULATOR, STANDARD = "simulator", "standard"
@@ -229,9 +230,10 @@ def _found(known: list[Known], identifier: str, what: str) -> Known:
     for one in known:
         if one.id == identifier:
             return one
+    asked, ids = identifier[:60], [one.id for one in known]
     raise Unknown(
-        what, f"there is no {what} {identifier[:60]!r}", step="choose", value=identifier[:60],
-        limit="one of: " + ", ".join(one.id for one in known), remedy=f"choose one of these, or add the {what} first",
+        what, f"there is no {what} {asked!r}" + did_you_mean(asked, ids), step="choose", value=asked,
+        limit="one of: " + ", ".join(ids), remedy=f"choose one of these, or add the {what} first",
     )  # fmt: skip
 
 

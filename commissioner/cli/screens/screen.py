@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -32,6 +33,11 @@ class Terminal(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str("\n".join(map(visible, text.split("\n"))), **options)
+
+    def on_broken_pipe(self) -> None:
+        """Nobody reads any more (`| head`): silent from here on, and the verb ends with its own exit code."""
+        self.quiet = True
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self.file.fileno())
 
 
 out = Terminal(highlight=False)
@@ -82,15 +88,9 @@ def busy(doing: str) -> Iterator[None]:
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
     err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
-    remedy = once(error.remedy, error.limit)
-    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", remedy)):
+    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
         if fact not in (None, ""):
             err.print(f"  [dim]{name:<7}[/]{text(shown(fact, error.unit), SENTENCE)}")
-
-
-def once(remedy: str, limit: object) -> str:
-    """The remedy without the limit behind it, which stands in the line above: a file's error says there what is expected."""
-    return remedy.removesuffix(f": {limit}") if limit not in (None, "") else remedy
 
 
 _SIGNS = (
@@ -186,7 +186,6 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
     error = document.get("error")
     if error:
-        error = {**error, "remedy": once(str(error.get("remedy") or ""), error.get("limit"))}
         for name in ("step", "value", "limit", "remedy"):
             if error.get(name) not in (None, ""):
                 out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name], error.get('unit', '')))}")
