@@ -37,6 +37,11 @@ def in_unit(text: str, value: object, unit: str) -> str:
     return f"{text} {unit}" if unit and isinstance(value, int | float) and not isinstance(value, bool) else text
 
 
+def counted(count: int, what: str) -> str:
+    """`1 register`, `2 registers`."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """`; did you mean 'danfoss_fc302'?` where a name that is not there is nearly, or begins, one that is; else nothing."""
     spelled = {one.casefold(): one for one in known}

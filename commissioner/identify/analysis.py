@@ -315,7 +315,7 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
             )
         if not result.whiteness.is_white:
             remarks.append(
-                f"axis {result.axis_deg:g} deg: the residual is not white ({result.whiteness.statistic:.0f}, limit "
+                f"axis {result.axis_deg:g} deg: the residual is not white ({result.whiteness.statistic:.3g}, limit "
                 f"{result.whiteness.limit}); standard errors are widened for it"
             )
     if any(not (r.whiteness.is_white or holds_noise(r.batch.residuals, r.residual_rms_a)) for r in results):

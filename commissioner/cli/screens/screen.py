@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import Any, Literal
 
 from rich.console import Console
@@ -16,6 +17,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from commissioner.cli.console import spelled
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.motor.quantities import FIVE
@@ -32,7 +34,7 @@ class Terminal(Console):
     """Obeys markup alone: a control character in any sentence, from wherever it comes, only shows."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        return super().render_str("\n".join(map(visible, text.split("\n"))), **options)
+        return super().render_str(spelled("\n".join(map(visible, text.split("\n"))), self.encoding), **options)
 
     def on_broken_pipe(self) -> None:
         """Nobody reads any more (`| head`): silent from here on, and the verb ends with its own exit code."""
@@ -117,15 +119,22 @@ def table(
     rows: Iterable[Sequence[str]],
     *,
     right: Iterable[int] = (),
+    widths: Mapping[int, int] = MappingProxyType({}),
 ) -> Table:
-    """A rich table; `right` lists the columns that hold numbers. A word wider than its column goes on in the next line: nothing
+    """A rich table; `right` lists the columns that hold numbers, `widths` those of a fixed width. A word wider than its column goes on in the next line: nothing
     is cut off."""
     made = Table(
         title=title or None, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
     )
     for index, name in enumerate(header):
         side: Literal["left", "right"] = "right" if index in set(right) else "left"
-        made.add_column(name, justify=side, no_wrap=index == 0, overflow="ellipsis" if index == 0 else "fold")
+        made.add_column(
+            name,
+            justify=side,
+            width=widths.get(index),
+            no_wrap=index == 0,
+            overflow="ellipsis" if index == 0 else "fold",
+        )
     for row in rows:
         made.add_row(*row)
     return made

@@ -1,5 +1,7 @@
 """A plate judged field by field: what each field must be is said once, by the loader of motor files."""
 
+import re
+
 import pytest
 from pydantic import ValidationError
 
@@ -38,3 +40,18 @@ def test_page_and_motor_file_say_the_same(key, value):
         MotorFile.model_validate(PLATE | {key: value})
     said = judge_plate(PLATE | {key: value})["fields"][key]["what"].removeprefix("must be ")
     assert f": {said}" in wanted(error.value.errors()[0], MotorFile)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"rated_speed_rpm": 1563}, {"rated_speed_rpm": 900}, {"pole_pairs": 1, "rated_speed_rpm": 3010}, {"rated_speed_rpm": 2900},
+        {"rated_current_a": 8.66}, {"rated_power_w": 4600}, {"rated_power_w": 400},
+    ],
+)  # fmt: skip
+def test_a_plate_that_contradicts_itself_is_told_in_german(changed):
+    fields = judge_plate(PLATE | changed)["fields"]
+    said = [field["remedy"] for field in fields.values() if not field["ok"]]
+    german = [Texts("de").tell(text) for text in said]
+    assert said
+    assert [text for text in german if re.search(r"\b(the|of|at|with|than|below)\b", text)] == []
