@@ -142,7 +142,7 @@ def _check_known(
         if encode_item(item, held) not in words:
             raise IdentityMismatch(
                 f"the drive holds a {plain_name(name)} that this run neither found nor wrote", step="restore", value=held, unit=item.unit,
-                limit=" or ".join(dict.fromkeys(f"{v:.6g}" for v in known if isinstance(v, int | float))),
+                limit=" or ".join(dict.fromkeys(f"{v:.6g} {item.unit}".strip() for v in known if isinstance(v, int | float))),
                 remedy="someone changed the drive after this run: restore the newest run of this drive first, or "
                 "enter the values at the drive",
             )  # fmt: skip

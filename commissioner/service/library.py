@@ -23,6 +23,9 @@ from commissioner.settings import CONFIG_FOLDER, MotorFile, ProcedureFile, load_
 from commissioner.text import did_you_mean
 from commissioner.validation import requirement
 
+LEAST_RUN_UP_S, LONGEST_RUN_UP_S = 0.003, 300.0
+"""To rated speed at rated torque: rotors alone take 0.03 ... 2 s, a fan or a centrifuge a hundred times that."""
+OF_INERTIA = "is the moment of inertia in kg m²?"
 SIMULATOR, STANDARD = "simulator", "standard"
 PLATE_FIELDS = tuple(name for name in MotorFile.model_fields if name != "name")
 TYPICAL_EFFICIENCY = ((500.0, 0.45, 0.80), (3e3, 0.65, 0.90), (30e3, 0.78, 0.955), (math.inf, 0.86, 0.98))
@@ -195,6 +198,12 @@ def usual_efficiency(plate: Nameplate) -> tuple[float, float]:
 
 def questions(plate: Nameplate) -> list[str]:
     """What a plate that is possible but unusual should be asked."""
+    run_up_s = plate.run_up_s
+    is_odd = run_up_s is not None and not LEAST_RUN_UP_S < run_up_s < LONGEST_RUN_UP_S
+    return [*_of_efficiency(plate), *([OF_INERTIA] if is_odd else [])]
+
+
+def _of_efficiency(plate: Nameplate) -> list[str]:
     low, high = usual_efficiency(plate)
     efficiency = efficiency_of(plate)
     if low <= efficiency <= high:

@@ -9,7 +9,6 @@ from commissioner.errors import DriveFault, ReplyMismatch, ReplyTimeout, Request
 from commissioner.link.drive.facts import Action, Intent, Journal
 from commissioner.link.drive.ordinary.unlocking import unlocked
 from commissioner.link.drive.parameter_sets import ParameterSets, Values
-from commissioner.records import plain_name
 from commissioner.registers.codec import Value
 from commissioner.registers.convention import staged_words_crc
 
@@ -92,8 +91,8 @@ class Staged:
             raise DriveFault(
                 f"the drive did not {step}: {meanings.get(result, 'unknown result')}",
                 step=step,
-                value=f"{plain_name(item)} {result}",
-                limit=f"{plain_name(item)} {DONE}",
+                value=result,
+                limit=DONE,
                 remedy="check the values against the drive's ranges and that it is stopped",
             )
 

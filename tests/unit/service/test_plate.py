@@ -5,8 +5,9 @@ import re
 import pytest
 from pydantic import ValidationError
 
-from commissioner.service.library import judge_plate
+from commissioner.service.library import OF_INERTIA, judge_plate
 from commissioner.service.page.texts import Texts
+from commissioner.service.page.work import say_plate
 from commissioner.settings import MotorFile
 from commissioner.validation import wanted
 
@@ -55,3 +56,14 @@ def test_a_plate_that_contradicts_itself_is_told_in_german(changed):
     german = [Texts("de").tell(text) for text in said]
     assert said
     assert [text for text in german if re.search(r"\b(the|of|at|with|than|below)\b", text)] == []
+
+
+@pytest.mark.parametrize(
+    ("inertia", "is_asked"), [(0.015, False), (0.004, False), (2.0, False), (150.0, True), (1.5e-6, True), ("", False)]
+)
+def test_a_moment_of_inertia_in_another_unit_is_asked_about(inertia, is_asked):
+    """0.015 kg m2 are 150 kg cm2."""
+    judged = judge_plate(PLATE | {"inertia_kg_m2": inertia})
+    assert judged["ok"] and (judged["questions"] == [OF_INERTIA]) is is_asked
+    said = say_plate(judged, Texts("de"))
+    assert ("Trägheitsmoment" in said["reason"], said["is_odd"]) == (is_asked, is_asked)
