@@ -51,6 +51,7 @@ from commissioner.registers.status import STATUS_BITS
 from commissioner.registers.tuning import Fact, Limit, Step, Tuning, check_tuning
 from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
+from commissioner.text import did_you_mean
 
 AS_WRITTEN = {
     "type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop", "source", "parameter", "index",
@@ -175,7 +176,10 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     ):
         if value and value not in known:
             raise ConfigurationError(
-                file=file, key=f"{key}.{what}", value=value, expected="one of: " + ", ".join(sorted(known))
+                file=file,
+                key=f"{key}.{what}",
+                value=value,
+                expected="one of: " + ", ".join(sorted(known)) + did_you_mean(str(value), known),
             )
     wanted = unit_of(table.quantity or name, table.convention)
     if wanted is not None and table.unit != wanted:

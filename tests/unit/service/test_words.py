@@ -158,3 +158,11 @@ def test_every_register_that_a_shipped_file_describes_has_a_german_name():
 def test_two_measurements_of_one_day_are_told_apart_by_their_time():
     instants = ["2026-11-29T04:46:37+00:00", "2026-11-29T04:54:32+00:00", "2027-01-02T10:00:00+00:00"]
     assert Words(Texts("en")).days(instants) == ["2026-11-29 04:46:37", "2026-11-29 04:54:32", "2027-01-02"]
+
+
+def test_who_sits_here_without_an_account_is_no_english_word_on_the_german_page():
+    assert (Texts("de").person("operator"), Texts("de").person("otto"), Texts("en").person("operator")) == (
+        "Bediener",
+        "otto",
+        "operator",
+    )

@@ -11,6 +11,7 @@ from commissioner.records import drive_words, plain_name
 from commissioner.run.archive.seal import read_key
 from commissioner.run.holding.priority import lower_priority
 from commissioner.run.write_accepted import Plan, as_document
+from commissioner.text import counted
 
 
 def restore_run(
@@ -72,7 +73,7 @@ def write_run(
     done = write.write_run(request, shown.token if token is None else token)
     report = done.report
     if as_json:
-        reason = f"{len(report.written)} values written, {screen.kept(report.is_stored)}"
+        reason = f"{counted(len(report.written), 'value')} written, {screen.kept(report.is_stored)}"
         screen.emit({"outcome": "written", "reason": reason} | vars(done))
         return
     screen.out.print(f"[green]{len(report.written)} parameters written, {screen.kept(report.is_stored)}[/]")
