@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from pathlib import Path
 
 from commissioner.cli.screens import screen
@@ -123,10 +124,24 @@ def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
             raise SystemExit(DataRefused.exit_code)
         return
     if done.difference is not None:
+        place, replayed, archived = apart(done.difference.replayed, done.difference.archived)
         raise DataRefused(
-            f"decision {done.difference.number} of {done.run} comes out otherwise", step="replay",
-            value=done.difference.replayed, limit=done.difference.archived,
+            f"decision {done.difference.number} of {done.run} comes out otherwise{f' in {place}' if place else ''}", step="replay",
+            value=replayed, limit=archived,
             remedy="the run was made by another version of commissioner, or its folder was changed",
         )  # fmt: skip
     until = "" if verified.is_whole else f" up to the first loss; {screen.text(verified.usable)}"
     screen.out.print(f"[green]{done.decisions} decisions, all identical[/]{until}")
+
+
+def apart(one: object, other: object, place: str = "") -> tuple[str, object, object]:
+    """Where two documents first differ, as `record.remarks.0`, and what each has there; None for what one of them lacks."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        pairs = [(str(key), one.get(key), other.get(key)) for key in (*one, *(key for key in other if key not in one))]
+    elif isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        pairs = [(str(number), *pair) for number, pair in enumerate(zip_longest(one, other))]
+    else:
+        return place, one, other
+    differing = ((key, a, b) for key, a, b in pairs if a != b)
+    key, a, b = next(differing, ("", one, other))
+    return apart(a, b, f"{place}.{key}".strip(".")) if key else (place, one, other)
