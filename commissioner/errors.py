@@ -34,6 +34,8 @@ _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
 NOTHING = "nothing"
 """The value seen where there is none: a key that is missing."""
+NO_SUCH_KEY = "no such key"
+"""What is expected of a key that its table does not have."""
 OF_DISK = frozenset({errno.ENOSPC, errno.EROFS, errno.EIO, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """What a disk says that takes no more, or fails."""
 
@@ -97,10 +99,16 @@ class ConfigurationError(UsageError):
             step="read configuration",
             value=value if isinstance(value, int | float) or value == shown.strip("'") else shown,
             limit=expected,
-            remedy=f"correct {key} in {file}: {expected}",
+            remedy=f"{_repair(value, expected)} {key} in {file}",
         )
         self.file = file
         self.key = key
+
+
+def _repair(value: object, expected: str) -> str:
+    if value is None:
+        return "add"
+    return "rename or remove" if expected.startswith(NO_SUCH_KEY) else "correct"
 
 
 class DataRefused(CommissionerError):

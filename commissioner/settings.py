@@ -12,9 +12,9 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from commissioner.encoding import JsonObject
-from commissioner.errors import ConfigurationError, UsageError
+from commissioner.errors import ConfigurationError
 from commissioner.motor.nameplate import Nameplate, check, connection_of
-from commissioner.paths import no_file
+from commissioner.paths import no_file, no_such_name
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.validation import FileTable, first_problem
 
@@ -224,14 +224,7 @@ def _resolve(name_or_path: str, folder: str) -> Path:
         return Path(name_or_path)
     shipped = CONFIG_FOLDER / folder / f"{name_or_path}.toml"
     if not shipped.is_file():
-        known = ", ".join(sorted(p.stem for p in (CONFIG_FOLDER / folder).glob("*.toml")))
-        raise UsageError(
-            f"there is no {folder[:-1]} named {name_or_path!r}",
-            step="read configuration",
-            value=name_or_path,
-            limit=f"one of: {known}",
-            remedy="give one of these names or the path of a .toml file",
-        )
+        raise no_such_name(folder[:-1], name_or_path, [path.stem for path in (CONFIG_FOLDER / folder).glob("*.toml")])
     return shipped
 
 

@@ -11,6 +11,9 @@ from typing import Any, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
+from commissioner.errors import NO_SUCH_KEY
+from commissioner.text import did_you_mean
+
 UNITS = {
     "w": "W", "v": "V", "hz": "Hz", "a": "A", "rpm": "1/min", "m2": "kg m2", "s": "s", "ms": "ms", "deg": "degrees",
     "degc": "degC", "percent": "%",
@@ -68,7 +71,12 @@ def wanted(problem: Mapping[str, Any], model: type[BaseModel] | None = None) -> 
     """What a field must be. `problem`: one of pydantic's; `model`: whose field it is, where that is known."""
     location = _named(problem["loc"])
     if problem["type"] == "extra_forbidden":
-        return "no such key" + (f"; known here: {', '.join(_keys(model, location[:-1]))}" if model else "")
+        known = _keys(model, location[:-1]) if model else []
+        return (
+            NO_SUCH_KEY
+            + (f"; known here: {', '.join(known)}" if known else "")
+            + did_you_mean(str(location[-1]), known)
+        )
     name = _spoken(location)[0] or "the whole"
     field = _field(model, location) if model else None
     description = f" ({field.description})" if field is not None and field.description else ""

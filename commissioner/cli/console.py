@@ -19,10 +19,14 @@ SPELLED = {
 
 def degrade_output() -> None:
     """From here on stdout and stderr spell out what their encoding lacks."""
-    codecs.register_error("spelled-out", _spell)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="spelled-out")
+
+
+def spelled(text: str, encoding: str) -> str:
+    """The text as a console of this encoding shows it: spelled out before columns are laid, not after."""
+    return text if text.isascii() else text.encode(encoding, "spelled-out").decode(encoding)
 
 
 def _spell(error: UnicodeError) -> tuple[str, int]:
@@ -36,3 +40,6 @@ def _plainly(sign: str) -> str:
     """The spelling of one sign, or the sign without its marks, or `?`."""
     plain = SPELLED.get(sign) or unicodedata.normalize("NFKD", sign)
     return plain.encode("ascii", "ignore").decode("ascii") or "?"
+
+
+codecs.register_error("spelled-out", _spell)

@@ -17,6 +17,7 @@ from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.codec import Value
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.status import DriveState
+from commissioner.text import did_you_mean
 
 TEST_CURRENT_FRACTION = 0.2
 """Test current peak, of the rated motor current's peak in the drive's plate, else of the drive's own."""
@@ -84,7 +85,8 @@ def chosen(only: Collection[str]) -> tuple[Rule, ...]:
     unknown = set(only) - {rule.name for rule in RULES}
     if unknown:
         raise UsageError(
-            f"no rule is named {sorted(unknown)[0]!r}",
+            f"no rule is named {sorted(unknown)[0]!r}"
+            + did_you_mean(sorted(unknown)[0], [rule.name for rule in RULES]),
             step="choose rules",
             value=", ".join(sorted(unknown)),
             limit=", ".join(rule.name for rule in RULES),

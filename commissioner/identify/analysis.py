@@ -314,9 +314,10 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
                 "standard errors: the batch fit counts"
             )
         if not result.whiteness.is_white:
+            statistic, limit = result.whiteness.statistic, result.whiteness.limit
+            shown = f"{statistic:.{0 if round(statistic) > limit else 2}f}"  # 20.13 is no 20 beside a limit of 20.1
             remarks.append(
-                f"axis {result.axis_deg:g} deg: the residual is not white ({result.whiteness.statistic:.0f}, limit "
-                f"{result.whiteness.limit}); standard errors are widened for it"
+                f"axis {result.axis_deg:g} deg: the residual is not white ({shown}, limit {limit}); standard errors are widened for it"
             )
     if any(not (r.whiteness.is_white or holds_noise(r.batch.residuals, r.residual_rms_a)) for r in results):
         remarks.append(

@@ -42,6 +42,12 @@ class Nameplate:
         return 1.0 - self.rated_speed_rpm * self.pole_pairs / (60.0 * self.rated_frequency_hz)
 
     @property
+    def run_up_s(self) -> float | None:
+        """From standstill to rated speed at rated torque, J n^2 / P: what a moment of inertia in a wrong unit makes absurd."""
+        speed_rad_per_s = 2.0 * math.pi * self.rated_speed_rpm / 60.0
+        return self.inertia_kg_m2 and self.inertia_kg_m2 * speed_rad_per_s**2 / self.rated_power_w
+
+    @property
     def rated_current_peak_a(self) -> float:
         return math.sqrt(2.0) * self.rated_current_a
 

@@ -58,6 +58,8 @@ class DriveLimits:
     winding_max_degc: float
 
 
+UNITS_OF_KEYS = ("w", "v", "hz", "a", "rpm", "s", "ms", "wb", "degc", "percent", "counts")
+"""By which a drive file's keys end; the value beside the check's name has it, and counts have none."""
 SMALLEST_DRIVE = 0.9
 """Peak rated current of the drive, of the test current: on a smaller drive tests aim lower (`Findings.test_current_a`)."""
 
@@ -76,7 +78,7 @@ def check_failed(results: Sequence[CheckResult]) -> CheckFailed | None:
 def check_name(check: str) -> str:
     """`rated_power_w in the drive` -> `rated power in the drive`: no key, and no unit in the name."""
     plain = re.sub(r", deg[A-Z]$", "", check)
-    return re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
+    return re.sub(rf"_({'|'.join(UNITS_OF_KEYS)})( in the drive)$", r"\2", plain).replace("_", " ")
 
 
 def check_unit(check: str) -> str:

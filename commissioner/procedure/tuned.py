@@ -72,11 +72,13 @@ class TuneVerdict:
     def reason(self) -> str:
         if self.objections:
             return self.objections[0].what
-        return "the drive's own tunings agree with each other" + (
-            f"; not compared with the plate: {', '.join(map(plain_name, self.not_judged))}"
-            if self.not_judged
-            else " and with the plate"
+        unjudged = (
+            f"; not compared with the plate: {', '.join(map(plain_name, self.not_judged))}" if self.not_judged else ""
         )
+        if all(len(row.values) >= FEWEST for row in self.rows):
+            return "the drive's own tunings agree with each other" + (unjudged or " and with the plate")
+        said = "the drive has tuned itself" if unjudged else "the drive's own tuning agrees with the plate"
+        return f"{said}{unjudged}; fewer than {FEWEST} repeats say nothing of how far its tunings scatter"
 
 
 def judge_tunings(

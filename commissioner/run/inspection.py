@@ -77,9 +77,11 @@ def _found(inverter: Inverter, held: Mapping[str, float], nameplate: Nameplate) 
     doubtful = {d.name: d.as_error() for d in inverter.implausible(held, nameplate)}
     for name, (low, high) in parameter_limits(inverter.profile, nameplate).items():
         error = doubtful.get(name)
-        seen = f"{held[name]:.6g} {inverter.profile.item(name).unit}"
+        unit = inverter.profile.item(name).unit
         if error is None:
-            yield CheckResult(f"{name} in the drive", True, seen, f"near {low:.4g} ... {high:.4g}", "")
+            yield CheckResult(
+                f"{name} in the drive", True, f"{held[name]:.6g} {unit}", f"near {low:.4g} ... {high:.4g} {unit}", ""
+            )
         else:
             yield CheckResult(error.what, False, error.value, error.limit, error.remedy)
 

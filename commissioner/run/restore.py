@@ -14,7 +14,7 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import archived_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
-from commissioner.records import ParameterSnapshot, WrittenParameter
+from commissioner.records import ParameterSnapshot, WrittenParameter, plain_name
 from commissioner.registers.codec import encode_item
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
@@ -141,8 +141,8 @@ def _check_known(
         words = [encode_item(item, value) for value in known if isinstance(value, int | float)]
         if encode_item(item, held) not in words:
             raise IdentityMismatch(
-                f"the drive holds a {name} that this run neither found nor wrote", step="restore", value=held,
-                limit=" or ".join(dict.fromkeys(f"{v:.6g}" for v in known if isinstance(v, int | float))),
+                f"the drive holds a {plain_name(name)} that this run neither found nor wrote", step="restore", value=held, unit=item.unit,
+                limit=" or ".join(dict.fromkeys(f"{v:.6g} {item.unit}".strip() for v in known if isinstance(v, int | float))),
                 remedy="someone changed the drive after this run: restore the newest run of this drive first, or "
                 "enter the values at the drive",
             )  # fmt: skip

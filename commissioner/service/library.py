@@ -20,8 +20,12 @@ from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
 from commissioner.service.problems import Refusal, Unknown
 from commissioner.settings import CONFIG_FOLDER, MotorFile, ProcedureFile, load_motor, must_agree, read_toml
+from commissioner.text import did_you_mean
 from commissioner.validation import requirement
 
+LEAST_RUN_UP_S, LONGEST_RUN_UP_S = 0.003, 300.0
+"""To rated speed at rated torque: rotors alone take 0.03 ... 2 s, a fan or a centrifuge a hundred times that."""
+OF_INERTIA = "is the moment of inertia in kg m²?"
 SIMULATOR, STANDARD = "simulator", "standard"
 PLATE_FIELDS = tuple(name for name in MotorFile.model_fields if name != "name")
 TYPICAL_EFFICIENCY = ((500.0, 0.45, 0.80), (3e3, 0.65, 0.90), (30e3, 0.78, 0.955), (math.inf, 0.86, 0.98))
@@ -194,6 +198,12 @@ def usual_efficiency(plate: Nameplate) -> tuple[float, float]:
 
 def questions(plate: Nameplate) -> list[str]:
     """What a plate that is possible but unusual should be asked."""
+    run_up_s = plate.run_up_s
+    is_odd = run_up_s is not None and not LEAST_RUN_UP_S < run_up_s < LONGEST_RUN_UP_S
+    return [*_of_efficiency(plate), *([OF_INERTIA] if is_odd else [])]
+
+
+def _of_efficiency(plate: Nameplate) -> list[str]:
     low, high = usual_efficiency(plate)
     efficiency = efficiency_of(plate)
     if low <= efficiency <= high:
@@ -229,9 +239,10 @@ def _found(known: list[Known], identifier: str, what: str) -> Known:
     for one in known:
         if one.id == identifier:
             return one
+    asked, ids = identifier[:60], [one.id for one in known]
     raise Unknown(
-        what, f"there is no {what} {identifier[:60]!r}", step="choose", value=identifier[:60],
-        limit="one of: " + ", ".join(one.id for one in known), remedy=f"choose one of these, or add the {what} first",
+        what, f"there is no {what} {asked!r}" + did_you_mean(asked, ids), step="choose", value=asked,
+        limit="one of: " + ", ".join(ids), remedy=f"choose one of these, or add the {what} first",
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.identify.intake.plate import nameplate_from
+from commissioner.link.files.drive_file import load_profile
 from commissioner.recordings.plate import plate_of
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.settings import CONFIG_FOLDER, load_motor, load_procedure
@@ -94,8 +95,8 @@ def test_a_decimal_comma_is_told_with_its_line_and_the_point(tmp_path):
     number = PLATE.splitlines().index(current) + 1
     with pytest.raises(ConfigurationError) as caught:
         load_motor(_motor(tmp_path, PLATE.replace(current, "rated_current_a = 4,86  # A")))
-    assert f"in line {number} a decimal comma" in caught.value.remedy
-    assert "rated_current_a = 4.86" in caught.value.remedy
+    assert f"in line {number} a decimal comma" in caught.value.limit
+    assert "rated_current_a = 4.86" in caught.value.limit
 
 
 @pytest.mark.parametrize(
@@ -117,8 +118,8 @@ def test_a_line_that_people_write_in_place_of_toml_is_told_with_the_right_one(tm
     path.write_bytes(PLATE.replace(old, line).replace("\n", ends).encode())
     with pytest.raises(ConfigurationError) as caught:
         load_motor(str(path))
-    assert f"in line {number} " in caught.value.remedy
-    assert what in caught.value.remedy and caught.value.remedy.endswith(right)
+    assert f"in line {number} " in caught.value.limit
+    assert what in caught.value.limit and caught.value.limit.endswith(right)
 
 
 @pytest.mark.parametrize(
@@ -129,13 +130,13 @@ def test_a_file_in_another_encoding_is_to_be_saved_as_utf_8(tmp_path, encoding, 
     path.write_text(PLATE.replace("[", "").replace("2.2 kW", "Lüfter"), encoding)
     with pytest.raises(ConfigurationError) as caught:
         load_motor(str(path))
-    assert f"the file is {told}: save it as UTF-8" in caught.value.remedy
+    assert f"the file is {told}: save it as UTF-8" in caught.value.limit
 
 
 def test_a_number_that_only_looks_like_one_with_a_unit_is_not_blamed(tmp_path):
     with pytest.raises(ConfigurationError) as caught:
         load_motor(_motor(tmp_path, "rated_power_w = 2e3\npole_pairs = 0x2\nrated_current_a = 5 A\n"))
-    assert "in line 3 a unit stands behind the number: rated_current_a = 5" in caught.value.remedy
+    assert "in line 3 a unit stands behind the number: rated_current_a = 5" in caught.value.limit
 
 
 def test_one_pole_pair_is_one(tmp_path):
@@ -160,7 +161,43 @@ def test_broken_toml_and_missing_files_are_named(tmp_path):
         load_motor(str(tmp_path / "nothing.toml"))
     with pytest.raises(UsageError) as caught:
         load_motor("no_such_motor")
-    assert "motor_2kw2" in str(caught.value.limit)
+    assert "motor_2kw2" in str(caught.value.limit) and "did you mean" not in str(caught.value)
+
+
+def test_a_folder_in_place_of_a_name_is_called_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "motors").mkdir()
+    with pytest.raises(UsageError, match="motors is a folder"):
+        load_motor("motors")
+
+
+@pytest.mark.parametrize(
+    ("load", "asked", "meant"),
+    [
+        (load_motor, "motor_2kw3", "motor_2kw2"),
+        (load_profile, "danfos_fc302", "danfoss_fc302"),
+        (load_profile, "Yaskawa_A1000", "yaskawa_a1000"),
+        (load_profile, "simul", "simulated"),
+    ],
+)
+def test_a_name_that_is_nearly_one_that_comes_along_is_asked_back(load, asked, meant):
+    with pytest.raises(UsageError, match=f"did you mean '{meant}'"):
+        load(asked)
+
+
+def test_a_files_error_says_its_limit_once_and_what_to_do_with_the_key(tmp_path):
+    """A key that is missing is added, one that nobody knows is renamed, another is corrected."""
+    for old, new, remedy in (
+        ("power_factor = 0.80", "", "add power_factor in "),
+        ("power_factor = 0.80", "power_facter = 0.80", "rename or remove power_facter in "),
+        ("power_factor = 0.80", "power_factor = 8.0", "correct power_factor in "),
+    ):
+        path = _motor(tmp_path, PLATE.replace(old, new))
+        with pytest.raises(ConfigurationError) as caught:
+            load_motor(path)
+        assert caught.value.remedy == f"{remedy}{path}"
+        assert str(caught.value.limit)
+    assert "did you mean" not in str(caught.value.limit)
 
 
 def test_a_huge_file_is_not_read(tmp_path):
@@ -216,7 +253,7 @@ def test_times_that_contradict_each_other_are_refused_with_both_keys(tmp_path, r
     assert (error.exit_code, error.step) == (2, "read configuration")
     assert (error.key, error.value, error.limit) == (key, value, limit)
     assert key in error.remedy
-    assert "limits.axis_time_s" in error.remedy
+    assert "limits.axis_time_s" in str(error.limit)
 
 
 def test_a_run_may_be_as_long_as_its_one_test_and_a_test_just_longer_than_its_tones(tmp_path):

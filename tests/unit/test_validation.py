@@ -57,8 +57,16 @@ class Table(Inner):
         ({"axes_deg": [0.0, "x"]}, "axes_deg.1", "axes, entry 2: a number in degrees"),
         ({"inner": 5}, "inner", "inner: a table of keys and values"),
         ({"items": []}, "items", "items: a table of keys and values"),
-        ({"inner": {"hold": 1.0}}, "inner.hold", "no such key; known here: hold_s, is_on, names"),
-        ({"items": {"x": {"hold": 1.0}}}, "items.x.hold", "no such key; known here: hold_s, is_on, names"),
+        (
+            {"inner": {"hold": 1.0}},
+            "inner.hold",
+            "no such key; known here: hold_s, is_on, names; did you mean 'hold_s'?",
+        ),
+        (
+            {"items": {"x": {"hold": 1.0}}},
+            "items.x.hold",
+            "no such key; known here: hold_s, is_on, names; did you mean 'hold_s'?",
+        ),
     ],
 )
 def test_a_problem_names_the_field_its_unit_and_what_is_wanted(document, key, expected):
@@ -75,7 +83,10 @@ def test_a_misspelt_key_comes_before_the_one_that_is_missing_for_it():
 
     with pytest.raises(ValidationError) as caught:
         Needed.model_validate({"polepairs": 2})
-    assert first_problem(caught.value, Needed).expected == "no such key; known here: pole_pairs"
+    assert (
+        first_problem(caught.value, Needed).expected
+        == "no such key; known here: pole_pairs; did you mean 'pole_pairs'?"
+    )
     missing = next(one for one in caught.value.errors() if one["type"] == "missing")
     assert wanted(missing, Needed) == "pole pairs: needed"
 

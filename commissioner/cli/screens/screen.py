@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import Any, Literal
 
 from rich.console import Console
@@ -15,6 +17,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from commissioner.cli.console import spelled
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.motor.quantities import FIVE
@@ -31,7 +34,12 @@ class Terminal(Console):
     """Obeys markup alone: a control character in any sentence, from wherever it comes, only shows."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        return super().render_str("\n".join(map(visible, text.split("\n"))), **options)
+        return super().render_str(spelled("\n".join(map(visible, text.split("\n"))), self.encoding), **options)
+
+    def on_broken_pipe(self) -> None:
+        """Nobody reads any more (`| head`): silent from here on, and the verb ends with its own exit code."""
+        self.quiet = True
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self.file.fileno())
 
 
 out = Terminal(highlight=False)
@@ -82,15 +90,9 @@ def busy(doing: str) -> Iterator[None]:
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
     err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
-    remedy = once(error.remedy, error.limit)
-    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", remedy)):
+    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
         if fact not in (None, ""):
             err.print(f"  [dim]{name:<7}[/]{text(shown(fact, error.unit), SENTENCE)}")
-
-
-def once(remedy: str, limit: object) -> str:
-    """The remedy without the limit behind it, which stands in the line above: a file's error says there what is expected."""
-    return remedy.removesuffix(f": {limit}") if limit not in (None, "") else remedy
 
 
 _SIGNS = (
@@ -117,15 +119,22 @@ def table(
     rows: Iterable[Sequence[str]],
     *,
     right: Iterable[int] = (),
+    widths: Mapping[int, int] = MappingProxyType({}),
 ) -> Table:
-    """A rich table; `right` lists the columns that hold numbers. A word wider than its column goes on in the next line: nothing
+    """A rich table; `right` lists the columns that hold numbers, `widths` those of a fixed width. A word wider than its column goes on in the next line: nothing
     is cut off."""
     made = Table(
         title=title or None, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
     )
     for index, name in enumerate(header):
         side: Literal["left", "right"] = "right" if index in set(right) else "left"
-        made.add_column(name, justify=side, no_wrap=index == 0, overflow="ellipsis" if index == 0 else "fold")
+        made.add_column(
+            name,
+            justify=side,
+            width=widths.get(index),
+            no_wrap=index == 0,
+            overflow="ellipsis" if index == 0 else "fold",
+        )
     for row in rows:
         made.add_row(*row)
     return made
@@ -186,7 +195,6 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
     error = document.get("error")
     if error:
-        error = {**error, "remedy": once(str(error.get("remedy") or ""), error.get("limit"))}
         for name in ("step", "value", "limit", "remedy"):
             if error.get(name) not in (None, ""):
                 out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name], error.get('unit', '')))}")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from commissioner.cli.screens import screen
 from commissioner.docs import SCHEMA_ENDING, chapter_names, chapter_title, read_chapter, read_schema, schema_names
 from commissioner.errors import UsageError
+from commissioner.text import did_you_mean
 
 
 def docs(name: str | None, *, as_json: bool) -> None:
@@ -35,8 +36,9 @@ def _text(read: Callable[[str], str], name: str, names: tuple[str, ...]) -> str:
     try:
         return read(name)
     except KeyError:
+        everything = (*chapter_names(), *(f"{schema}{SCHEMA_ENDING}" for schema in schema_names()))
         raise UsageError(
-            f"the manual has no {name!r}", step="docs", value=name, limit="one of: " + ", ".join(names),
+            f"the manual has no {name!r}" + did_you_mean(name, everything), step="docs", value=name, limit="one of: " + ", ".join(names),
             remedy="`commissioner docs` lists the chapters and the schemas",
         ) from None  # fmt: skip
 

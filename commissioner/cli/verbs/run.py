@@ -16,6 +16,7 @@ from commissioner.operations.check import CheckRequest, check
 from commissioner.operations.commission import CommissionRequest, check_request, commission
 from commissioner.run.commission import Origin
 from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.text import counted
 
 
 def run(request: CommissionRequest, *, yes: bool, as_json: bool, dead_man: bool = False) -> None:
@@ -56,7 +57,7 @@ def _ask(request: CommissionRequest) -> None:
     screen.out.print(
         f"[bold]{escape(drive.words)}[/], motor of {plate_words(plate.known())}; {len(seen.checks)} of "
         f"{len(seen.checks)} checks passed.\n"
-        f"[bold yellow]The motor will be energised[/] at standstill, one axis at a time: {len(plan.tests_deg)} tests, about "
+        f"[bold yellow]The motor will be energised[/] at standstill, one axis at a time: {counted(len(plan.tests_deg), 'test')}, about "
         f"{job.stretch * plan.total_seconds:.0f} s in all{stretched}, never more than {job.total_time_s:.0f} s; up to "
         f"{job.test_current_a:.1f} A peak, direct current included.\n"
         "The output goes on and off by itself between the tests. No torque is made on purpose, but the shaft may move."

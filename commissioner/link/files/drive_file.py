@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 import commissioner
-from commissioner.errors import ConfigurationError, UsageError
+from commissioner.errors import ConfigurationError
 from commissioner.link.files.schema import (
     DriveFile,
     ItemTable,
@@ -26,6 +26,7 @@ from commissioner.link.files.schema import (
     WorkedTable,
     explained,
 )
+from commissioner.paths import no_such_name
 from commissioner.registers.contradictions import check_contradictions
 from commissioner.registers.convention import CONVENTIONS, QUANTITIES, UNITS, unit_of
 from commissioner.registers.mailbox import address_of
@@ -50,6 +51,7 @@ from commissioner.registers.status import STATUS_BITS
 from commissioner.registers.tuning import Fact, Limit, Step, Tuning, check_tuning
 from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
+from commissioner.text import did_you_mean
 
 AS_WRITTEN = {
     "type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop", "source", "parameter", "index",
@@ -101,13 +103,7 @@ def _locate(name_or_path: str) -> Path:
         return Path(name_or_path)
     if name_or_path in known_drives():
         return DRIVES_FOLDER / f"{name_or_path}.toml"
-    raise UsageError(
-        f"there is no drive named {name_or_path!r}",
-        step="read configuration",
-        value=name_or_path,
-        limit="one of: " + ", ".join(known_drives()),
-        remedy="give one of these names or the path of a .toml file",
-    )
+    raise no_such_name("drive", name_or_path, known_drives())
 
 
 def _profile(model: DriveFile, file: str) -> DriveProfile:
@@ -180,7 +176,10 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     ):
         if value and value not in known:
             raise ConfigurationError(
-                file=file, key=f"{key}.{what}", value=value, expected="one of: " + ", ".join(sorted(known))
+                file=file,
+                key=f"{key}.{what}",
+                value=value,
+                expected="one of: " + ", ".join(sorted(known)) + did_you_mean(str(value), known),
             )
     wanted = unit_of(table.quantity or name, table.convention)
     if wanted is not None and table.unit != wanted:

@@ -22,6 +22,7 @@ from commissioner.link.wire.trust import ConnectionTrust, SerialTrust, Trust, lo
 from commissioner.link.wire.unopened import unopened
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.profile import DriveProfile
+from commissioner.text import counted
 
 READ_COIL, READ, WRITE_COIL, WRITE_ONE, WRITE, EXCHANGE = 0x01, 0x03, 0x05, 0x06, 0x10, 0x17
 COIL_ON = 0xFF00
@@ -166,7 +167,7 @@ class ModbusPort:
 
     # --- one request each -------------------------------------------------------------------------------------------
     def _ask_read(self, address: int, count: int) -> Words:
-        what = f"read {count} registers at {address}"
+        what = f"read {counted(count, 'register')} at {address}"
         reply = self._transact(
             (READ, 2 * count),
             what,
@@ -191,7 +192,7 @@ class ModbusPort:
         return self._ask_read(address, count)
 
     def _ask_write(self, address: int, values: list[int]) -> None:
-        what = f"write {len(values)} registers at {address}"
+        what = f"write {counted(len(values), 'register')} at {address}"
         reply = self._transact(
             (WRITE, address, len(values)),
             what,
@@ -226,7 +227,7 @@ class ModbusPort:
         return bool(reply.bits[0])
 
     def _ask_exchange(self, write_address: int, values: list[int], read_address: int, count: int) -> Words:
-        what = f"write {len(values)} registers at {write_address} and read {count} at {read_address}"
+        what = f"write {counted(len(values), 'register')} at {write_address} and read {count} at {read_address}"
         reply = self._transact(
             (EXCHANGE, 2 * count),
             what,
@@ -328,7 +329,7 @@ class ModbusPort:
         return reply
 
     def _words(self, reply: ModbusPDU, count: int, what: str) -> Words:
-        self._expect(what, f"{len(reply.registers)} registers", f"{count} registers")
+        self._expect(what, counted(len(reply.registers), "register"), counted(count, "register"))
         return tuple(reply.registers)
 
     def _expect(self, what: str, seen: object, wanted: object) -> None:

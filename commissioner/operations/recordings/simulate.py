@@ -183,9 +183,10 @@ def _extended(path: Path, plain: bool) -> _Motor:
         document = read_json(path.read_text("utf-8"))
         return _of_document(without_effects(document) if plain else document)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ConfigurationError(
-            file=str(path), key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
-        ) from error
+        raise UsageError(
+            f"{path} holds no model", step="simulate", value=str(error), limit="a model.json written by `commissioner diagnose`",
+            remedy="give the model.json of a diagnosis, or a motor's name or file",
+        ) from error  # fmt: skip
 
 
 def _of_document(document: Mapping[str, Any]) -> _Motor:

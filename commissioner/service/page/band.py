@@ -264,7 +264,7 @@ def _ended(run: LiveRun, standing: str, word: str, t: Texts) -> tuple[str, str, 
         return "off-bad", t.say("The run was cut off. %(word)s", word=word), nothing
     outcome = end["outcome"]
     if state.stop is not None:
-        who = state.stop.get("person") or t.gettext("the operator")
+        who = t.person(state.stop.get("person") or "") or t.gettext("the operator")
         text = t.say("Stopped by %(who)s. %(word)s", who=who, word=word)
         return "off", text, t.say("stopped %(time)s", time=_time(str(state.stop["utc"])))
     if outcome == "commissioned":

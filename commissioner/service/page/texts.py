@@ -16,6 +16,7 @@ from starlette.requests import HTTPConnection
 from commissioner.motor.circuit import QUANTILE
 from commissioner.motor.quantities import places
 from commissioner.report.sheet.words import NBSP
+from commissioner.service.access.visitors import LOCAL
 from commissioner.service.problems import Refusal
 
 LANGUAGES = ("en", "de")
@@ -79,6 +80,10 @@ class Texts:
             if (found := pattern.fullmatch(said)) is not None:
                 return translation % {name: self._value(value) for name, value in found.groupdict().items()}
         return said
+
+    def person(self, name: str) -> str:
+        """Who did it; whoever sits at this computer without an account is called by what they do."""
+        return self.gettext(name) if name == LOCAL else name
 
     def knows(self, text: object) -> bool:
         """Whether `tell` has it in this language."""

@@ -131,4 +131,6 @@ def _profile_of(parts: Parts, run: LiveRun) -> Tuning | None:
 
 def tuned_page(request: Request, place: Place, entry: Entry, **facts: Any) -> Response:
     """A tuning that was judged."""
-    return render(request, TUNED, place, entry=entry, **facts)
+    from commissioner.procedure.tuned import FEWEST  # with numpy behind it
+
+    return render(request, TUNED, place, entry=entry, fewest=FEWEST, **facts)

@@ -30,6 +30,10 @@ SCRIPT_TEXTS = (
 """What scripts say; the page hands it to them in its own language."""
 
 
+IN_THE_DRIVE = " in the drive"
+"""Behind a register's name: the check that its value could be read."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """One of the five numbers a motor is known by."""
@@ -79,7 +83,16 @@ class Words:
 
     def check_name(self, name: str) -> str:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
-        return capitalised(self._t.tell(check_name(name)))
+        plain = check_name(name)
+        item = plain.removesuffix(IN_THE_DRIVE)
+        if self._t.knows(plain) or item == plain or not self._t.knows(item):
+            return capitalised(self._t.tell(plain))
+        return capitalised(self._t.say("%(item)s in the drive", item=self._t.tell(item)))
+
+    def days(self, utcs: Sequence[str]) -> list[str]:
+        """The day of each instant, with its time where another one is of the same day."""
+        days = [utc[:10] for utc in utcs]
+        return [utc[:19].replace("T", " ") if days.count(day) > 1 else day for utc, day in zip(utcs, days, strict=True)]
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -142,6 +155,7 @@ class Words:
         if (said := self._t.tell(text)) != text:
             return said
         text = re.sub(r"(\d)\s*%", rf"\1{NBSP}%", text.replace("degC", "°C"))
+        text = re.sub(r"(\d) ohm\b", rf"\1{NBSP}Ω", text)
         text = re.sub(r"(\d) (?=[A-Za-z°])", rf"\1{NBSP}", text)
         for english in ("at most", "at least", "near", "of the peak", "peak", "to"):
             text = re.sub(rf"\b{english}\b", self._t.gettext(english), text)

@@ -19,7 +19,7 @@ from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
 from commissioner.service.configuration import DriveTable
 from commissioner.service.contract.plates import JudgedPlate, SaidPlate
-from commissioner.service.library import PLATE_FIELDS, SIMULATOR, Drive, Motor, judge_plate, number_of
+from commissioner.service.library import OF_INERTIA, PLATE_FIELDS, SIMULATOR, Drive, Motor, judge_plate, number_of
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
 from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
@@ -159,8 +159,12 @@ def say_plate(judged: JudgedPlate, t: Texts) -> SaidPlate:
         return {"ok": False, "fields": fields, "verdict": "", "reason": "", "is_odd": False}
     eta, is_odd = t.number(100 * judged["efficiency"], 1, "%"), bool(judged["questions"])
     if is_odd:
-        question = t.tell(judged["questions"][0])
-        reason = t.say("It implies an efficiency of %(eta)s: %(question)s", eta=eta, question=question)
+        reason = " ".join(
+            t.tell(question) if question == OF_INERTIA
+            else t.say("It implies an efficiency of %(eta)s: %(question)s", eta=eta, question=t.tell(question))
+            for question in judged["questions"]
+        )  # fmt: skip
+        reason = typeset(capitalised(reason))
     else:
         low, high = judged["usual_efficiency"]
         reason = " ".join(

@@ -320,7 +320,7 @@ def test_the_library_writes_nothing_to_the_terminal():
         run = subprocess.run(
             [sys.executable, "-c", LISTEN_TO_NOBODY, str(device.port)], capture_output=True, text=True, check=True
         )
-    assert run.stdout == "no answer to 'read 1 registers at 100'\n"
+    assert run.stdout == "no answer to 'read 1 register at 100'\n"
     assert run.stderr == ""
 
 

@@ -90,3 +90,16 @@ def test_a_sentence_has_the_signs_of_the_table_above_it():
     assert signs("would have come out as 9.427 ohm instead of 3.728 ohm, R_s") == (
         "would have come out as 9.427 Ω instead of 3.728 Ω, R_s"
     )
+
+
+def test_columns_stay_in_line_where_signs_are_spelled_out():
+    raw = io.BytesIO()
+    with io.TextIOWrapper(raw, encoding="cp1252") as console:
+        terminal = screen.Terminal(file=console, width=60)
+        terminal.print(
+            screen.table("", ("", "value"), [("leakage inductance L_σ", "21.5 Ω"), ("stator resistance R_s", "3.7 mH")])
+        )
+        console.flush()
+        lines = raw.getvalue().decode("cp1252").splitlines()
+    assert "L_sigma" in lines[1]
+    assert lines[1].index("21.5 ohm") == lines[2].index("3.7 mH")

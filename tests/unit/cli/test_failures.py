@@ -175,6 +175,17 @@ def waiting_verb(pipe):
         signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.parametrize(("arguments", "code"), [(("docs",), 0), (("simulate", "motor_2kw3", "--out", "x.csv"), 2)])
+def test_a_verb_whose_reader_has_gone_ends_with_its_own_exit_code(arguments, code):
+    """`| head` closes the pipe: 1 is no code of ours."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as pipe:
+        assert (
+            subprocess.run([*COMMAND, *arguments], check=False, stdout=pipe, stderr=pipe, timeout=60).returncode == code
+        )
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     process = waiting_verb(tmp_path / "pipe")

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from commissioner.errors import ConfigurationError, DataRefused, UsageError
+from commissioner.identify import analysis
 from commissioner.identify.analysis import identify
+from commissioner.identify.batch.whiteness import Whiteness
 from commissioner.identify.document import document as identification_document
+from commissioner.motor.nameplate import RatedFlux
 from commissioner.records import StandstillRecording
 from tests.support.standstill import linear_current, multitone
 
@@ -334,3 +338,13 @@ def test_a_fit_of_other_samples_is_not_taken_over():
     _, whole = two_tests()
     look = identify(recording(axis_deg=0.0, seed=7), estimator="nls", is_final=False)
     assert identify(whole, earlier=look).parameters == identify(whole).parameters
+
+
+@pytest.mark.parametrize(("statistic", "shown"), [(20.13, "(20.13, limit 20.1)"), (26.4, "(26, limit 20.1)")])
+def test_what_is_beyond_a_limit_does_not_look_as_if_it_were_within(statistic, shown):
+    result = SimpleNamespace(
+        axis_deg=0.0, disagreement_sigmas=0.0, whiteness=Whiteness(statistic), residual_rms_a=1.0,
+        batch=SimpleNamespace(residuals=[np.random.default_rng(1).normal(size=1000)]),
+    )  # fmt: skip
+    said = analysis._remarks([result], RatedFlux(0.7, 1.0), 0.5, 0.5)
+    assert any(shown in remark for remark in said)

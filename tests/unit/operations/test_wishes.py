@@ -82,3 +82,11 @@ def test_a_played_recording_without_noise_is_said_to_hold_none_and_is_known_by_i
     assert any("is not white" in remark for remark in said[quiet])
     assert any("hold no noise" in remark for remark in said[quiet])
     assert not any("hold no noise" in remark for remark in said[noisy])
+
+
+def test_a_runs_result_is_no_model_and_the_remedy_says_what_is(tmp_path):
+    result = tmp_path / "result.json"
+    result.write_text('{"kind": "commissioning result", "parameters": {}}', encoding="utf-8")
+    with pytest.raises(UsageError, match="holds no model") as caught:
+        simulate(SimulateRequest(str(result), tmp_path / "played.csv"))
+    assert "model.json of a diagnosis" in caught.value.remedy

@@ -160,8 +160,9 @@ def test_values_that_somebody_else_wrote_are_not_overwritten(bench):
     other = Inverter(bench.drive, PROFILE)
     other.write_parameters({"rotor_resistance": 1.5}, other.snapshot())
     held = bench.held()
-    with pytest.raises(IdentityMismatch, match="rotor_resistance") as caught:
+    with pytest.raises(IdentityMismatch, match="holds a rotor resistance that") as caught:
         bench.restore()
+    assert (caught.value.unit, str(caught.value.limit).count(" ohm")) == ("ohm", 2)
     assert caught.value.exit_code == 5 and "newest run" in caught.value.remedy
     assert bench.held() == held
 

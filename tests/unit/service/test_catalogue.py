@@ -3,6 +3,7 @@
 import ast
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from babel.messages.pofile import read_po
@@ -118,7 +119,12 @@ def of_tunings():
     for name in known_drives():
         if (tuning := load_profile(name).tuning) is not None:
             yield from (tuning.energises, tuning.proof, *(step.text for step in tuning.steps if step.text))
-    yield from (TuneVerdict((), (), {}, names).reason for names in ((), ("stator_resistance", "no_load_current")))
+    rows = (), (SimpleNamespace(values=(1.0,)),)
+    yield from (
+        TuneVerdict(row, (), {}, names).reason
+        for row in rows
+        for names in ((), ("stator_resistance", "no_load_current"))
+    )
 
 
 def test_every_message_of_templates_scripts_and_pages_has_its_translation(catalogue):

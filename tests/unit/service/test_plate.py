@@ -1,10 +1,13 @@
 """A plate judged field by field: what each field must be is said once, by the loader of motor files."""
 
+import re
+
 import pytest
 from pydantic import ValidationError
 
-from commissioner.service.library import judge_plate
+from commissioner.service.library import OF_INERTIA, judge_plate
 from commissioner.service.page.texts import Texts
+from commissioner.service.page.work import say_plate
 from commissioner.settings import MotorFile
 from commissioner.validation import wanted
 
@@ -38,3 +41,29 @@ def test_page_and_motor_file_say_the_same(key, value):
         MotorFile.model_validate(PLATE | {key: value})
     said = judge_plate(PLATE | {key: value})["fields"][key]["what"].removeprefix("must be ")
     assert f": {said}" in wanted(error.value.errors()[0], MotorFile)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"rated_speed_rpm": 1563}, {"rated_speed_rpm": 900}, {"pole_pairs": 1, "rated_speed_rpm": 3010}, {"rated_speed_rpm": 2900},
+        {"rated_current_a": 8.66}, {"rated_power_w": 4600}, {"rated_power_w": 400},
+    ],
+)  # fmt: skip
+def test_a_plate_that_contradicts_itself_is_told_in_german(changed):
+    fields = judge_plate(PLATE | changed)["fields"]
+    said = [field["remedy"] for field in fields.values() if not field["ok"]]
+    german = [Texts("de").tell(text) for text in said]
+    assert said
+    assert [text for text in german if re.search(r"\b(the|of|at|with|than|below)\b", text)] == []
+
+
+@pytest.mark.parametrize(
+    ("inertia", "is_asked"), [(0.015, False), (0.004, False), (2.0, False), (150.0, True), (1.5e-6, True), ("", False)]
+)
+def test_a_moment_of_inertia_in_another_unit_is_asked_about(inertia, is_asked):
+    """0.015 kg m2 are 150 kg cm2."""
+    judged = judge_plate(PLATE | {"inertia_kg_m2": inertia})
+    assert judged["ok"] and (judged["questions"] == [OF_INERTIA]) is is_asked
+    said = say_plate(judged, Texts("de"))
+    assert ("Trägheitsmoment" in said["reason"], said["is_odd"]) == (is_asked, is_asked)

@@ -9,11 +9,14 @@ from commissioner.diagnose.causes import CATALOGUE
 from commissioner.identify.estimate.axes import Cause
 from commissioner.identify.excite.duration import LongerTest
 from commissioner.identify.intake.alignment import TimeShift
+from commissioner.link.files.drive_file import known_drives, load_profile
+from commissioner.procedure.checks import check_name
+from commissioner.procedure.tuned import FEWEST
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.page.texts import Texts, texts_of
-from commissioner.service.page.words import Words
+from commissioner.service.page.words import IN_THE_DRIVE, Words
 
 
 def size(value, std, unit):
@@ -73,20 +76,38 @@ def test_the_live_line_speaks_the_language_of_its_page():
     assert texts_of(line).language == "de"
 
 
-@pytest.mark.parametrize(("plate_low", "is_compared"), [(None, False), (0.5, True)])
-def test_a_tuning_agrees_with_the_plate_only_where_it_was_compared_with_it(plate_low, is_compared):
+@pytest.mark.parametrize(
+    ("plate_low", "repeats", "title"),
+    [
+        (None, 3, "own tunings agree with each other<"), (0.5, 3, "own tunings agree with the plate and with each other<"),
+        (None, 1, "has tuned itself<"), (0.5, 2, "own tuning agrees with the plate<"),
+    ],
+)  # fmt: skip
+def test_tunings_agree_only_with_what_they_were_compared_with(plate_low, repeats, title):
+    """With the plate where it judges; with each other from three on."""
     row = {
         "name": "stator_resistance", "unit": "raw", "before": 1.0, "median": 2.0, "spread_percent": 0.1, "change_percent": None,
         "ours": plate_low, "plate_low": plate_low, "plate_high": plate_low,
     }  # fmt: skip
     words = {**words_of("en"), "losses": ()}
     template = environment().get_template("work/tuned.html")
-    result = {"outcome": "commissioned", "tune": {"rows": [row], "repeats": [{}]}, "reason": "x"}
+    result = {"outcome": "commissioned", "tune": {"rows": [row], "repeats": [{}] * repeats}, "reason": "x"}
     parts = environment().get_template("frame/parts.html").make_module(words)
-    context = template.new_context({**words, "p": parts, "result": result, "tune": result["tune"], "good": True})
+    context = template.new_context(
+        {
+            **words,
+            "p": parts,
+            "result": result,
+            "tune": result["tune"],
+            "good": True,
+            "is_unjudged": plate_low is None,
+            "fewest": FEWEST,
+        }
+    )
     said = "".join(template.blocks["main"](context))
-    assert "tunings agree with" in said
-    assert ("agree with the plate" in said) is is_compared
+    assert title in said
+    assert "raw" not in said
+    assert ("0.10\N{NO-BREAK SPACE}%" in said) is (repeats > 1)
 
 
 def test_a_value_in_words_has_the_readers_decimal_mark_and_a_key_keeps_its_letters():
@@ -105,3 +126,43 @@ def test_a_value_of_the_circuit_is_told_in_the_unit_that_people_read():
     german = Words(Texts("de"))
     assert german.circuit("leakage_inductance_h", 0.0215) == "21,5\u00a0mH"
     assert german.circuit("stator_resistance_ohm", 0.2956, 9.853) == "0,2956 … 9,853\u00a0Ω"
+
+
+def test_what_an_ordinary_drive_holds_is_named_and_measured_in_german():
+    """A register's name without its unit, the limit with the value's one."""
+    german = Words(Texts("de"))
+    for name, shown in (
+        ("stator_resistance in the drive", "Ständerwiderstand im Umrichter"),
+        ("communication_timeout_s in the drive", "Zeitüberwachung der Verbindung im Umrichter"),
+        ("rated_power_w in the drive", "Bemessungsleistung im Umrichter"),
+        ("my_register in the drive", "My register in the drive"),
+    ):
+        assert german.check_name(name) == shown
+    assert (
+        german.check_limit({"name": "", "limit": "near 0.3 ... 9.853 ohm"}) == "nahe 0,3 ... 9,853\N{NO-BREAK SPACE}Ω"
+    )
+
+
+def test_every_register_that_a_shipped_file_describes_has_a_german_name():
+    german, maps = Texts("de"), (load_profile(name) for name in known_drives())
+    items = {name for profile in maps if profile.kind != "commissioning_map" for name in profile.items}
+    assert len(items) > 30
+    assert (
+        sorted(
+            name for name in items if not german.knows(check_name(f"{name} in the drive").removesuffix(IN_THE_DRIVE))
+        )
+        == []
+    )
+
+
+def test_two_measurements_of_one_day_are_told_apart_by_their_time():
+    instants = ["2026-11-29T04:46:37+00:00", "2026-11-29T04:54:32+00:00", "2027-01-02T10:00:00+00:00"]
+    assert Words(Texts("en")).days(instants) == ["2026-11-29 04:46:37", "2026-11-29 04:54:32", "2027-01-02"]
+
+
+def test_who_sits_here_without_an_account_is_no_english_word_on_the_german_page():
+    assert (Texts("de").person("operator"), Texts("de").person("otto"), Texts("en").person("operator")) == (
+        "Bediener",
+        "otto",
+        "operator",
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from pathlib import Path
 
 from commissioner.cli.screens import screen
@@ -11,6 +12,7 @@ from commissioner.records import drive_words, plain_name
 from commissioner.run.archive.seal import read_key
 from commissioner.run.holding.priority import lower_priority
 from commissioner.run.write_accepted import Plan, as_document
+from commissioner.text import counted
 
 
 def restore_run(
@@ -72,7 +74,7 @@ def write_run(
     done = write.write_run(request, shown.token if token is None else token)
     report = done.report
     if as_json:
-        reason = f"{len(report.written)} values written, {screen.kept(report.is_stored)}"
+        reason = f"{counted(len(report.written), 'value')} written, {screen.kept(report.is_stored)}"
         screen.emit({"outcome": "written", "reason": reason} | vars(done))
         return
     screen.out.print(f"[green]{len(report.written)} parameters written, {screen.kept(report.is_stored)}[/]")
@@ -122,10 +124,24 @@ def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
             raise SystemExit(DataRefused.exit_code)
         return
     if done.difference is not None:
+        place, replayed, archived = apart(done.difference.replayed, done.difference.archived)
         raise DataRefused(
-            f"decision {done.difference.number} of {done.run} comes out otherwise", step="replay",
-            value=done.difference.replayed, limit=done.difference.archived,
+            f"decision {done.difference.number} of {done.run} comes out otherwise{f' in {place}' if place else ''}", step="replay",
+            value=replayed, limit=archived,
             remedy="the run was made by another version of commissioner, or its folder was changed",
         )  # fmt: skip
     until = "" if verified.is_whole else f" up to the first loss; {screen.text(verified.usable)}"
     screen.out.print(f"[green]{done.decisions} decisions, all identical[/]{until}")
+
+
+def apart(one: object, other: object, place: str = "") -> tuple[str, object, object]:
+    """Where two documents first differ, as `record.remarks.0`, and what each has there; None for what one of them lacks."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        pairs = [(str(key), one.get(key), other.get(key)) for key in (*one, *(key for key in other if key not in one))]
+    elif isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        pairs = [(str(number), *pair) for number, pair in enumerate(zip_longest(one, other))]
+    else:
+        return place, one, other
+    differing = ((key, a, b) for key, a, b in pairs if a != b)
+    key, a, b = next(differing, ("", one, other))
+    return apart(a, b, f"{place}.{key}".strip(".")) if key else (place, one, other)

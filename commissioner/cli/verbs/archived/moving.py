@@ -11,6 +11,7 @@ from commissioner.cli.screens import screen
 from commissioner.cli.screens.password import read_password
 from commissioner.errors import DataRefused
 from commissioner.operations.history import send, share
+from commissioner.text import counted
 
 
 class MovedRuns(TypedDict):
@@ -56,6 +57,6 @@ def _tell(move: Callable[[], tuple[share.Moved, ...]], *, as_json: bool) -> None
                 why = f": {screen.text(one.why)}" if one.why else f", {1e-6 * one.bytes:.1f} MB"
                 screen.out.print(f"{screen.text(one.run)}  {one.what}{why}")
         same = sum(one.what in (share.THERE, share.NEWER) for one in done)
-        screen.out.print(f"{len(done) - same - len(bad)} runs copied, {same} were there, {len(bad)} left")
+        screen.out.print(f"{counted(len(done) - same - len(bad), 'run')} copied, {same} were there, {len(bad)} left")
     if bad:
         raise SystemExit(DataRefused.exit_code)

@@ -13,6 +13,7 @@ from commissioner.operations.history.runs import Archive, Wanted, find_runs, ind
 from commissioner.operations.history.runs import show_run as look_up
 from commissioner.run.archive.documents import Loss
 from commissioner.run.archive.summary import RunSummary
+from commissioner.text import counted
 
 SHOWN = 50
 """Rows of a list for a person, unless another number is given."""
@@ -26,6 +27,10 @@ def find(archive: Archive, wanted: Wanted, limit: int | None, out: Path | None, 
         write_table(archive, out, as_json=as_json, wanted=wanted)
     else:
         list_runs(archive, as_json=as_json, wanted=wanted)
+
+
+OUTCOME_WIDTH, NARROW = 14, 100
+"""Of `commissioned` with its mark; of a terminal on which the columns share too little, and words would break."""
 
 
 def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
@@ -46,7 +51,8 @@ def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
     ]  # fmt: skip
     header = ("run", "outcome", "motor", "drive", "person", "holds")
     told = len(header) if any(row[-1] for row in rows) else len(header) - 1
-    screen.out.print(screen.table("", header[:told], [row[:told] for row in rows]))
+    least = {1: OUTCOME_WIDTH} if screen.out.width < NARROW else {}
+    screen.out.print(screen.table("", header[:told], [row[:told] for row in rows], widths=least))
     if (more := found.total - len(rows)) > 0:
         screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
 
@@ -57,7 +63,7 @@ def write_table(archive: Archive, out: Path, *, as_json: bool, wanted: Wanted) -
     if as_json:
         screen.emit(done)
     else:
-        screen.out.print(f"{done.runs} runs in {screen.text(done.table)}", soft_wrap=True)
+        screen.out.print(f"{counted(done.runs, 'run')} in {screen.text(done.table)}", soft_wrap=True)
 
 
 def index(folder: Path, *, rebuild: bool, database: str | None, as_json: bool) -> None:
@@ -68,7 +74,8 @@ def index(folder: Path, *, rebuild: bool, database: str | None, as_json: bool) -
         screen.emit(done)
     else:
         screen.out.print(
-            f"{done.runs} runs, {done.read} read, {done.gone} taken out: {screen.text(done.index)}", soft_wrap=True
+            f"{counted(done.runs, 'run')}, {done.read} read, {done.gone} taken out: {screen.text(done.index)}",
+            soft_wrap=True,
         )
 
 

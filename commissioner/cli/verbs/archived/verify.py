@@ -38,6 +38,8 @@ def verify_runs(runs: Path, run: str | None, *, everything: bool, seal: Path | N
     else:
         for one in found:
             _print(one)
+        for remark in dict.fromkeys(remark for one in found for remark in one.remarks):
+            screen.out.print(f"  [dim]{screen.text(remark)}[/]")
         if not found:
             screen.out.print(f"no runs in {screen.text(runs)}/")
     if damaged:
@@ -52,5 +54,3 @@ def _print(one: Verified) -> None:
         screen.out.print(f"  [red]{screen.text(loss.file)}{place}[/]: {screen.text(loss.what)}")
     if one.seal != "none":
         screen.out.print(f"  seal: {one.seal}")
-    for remark in one.remarks:
-        screen.out.print(f"  [dim]{screen.text(remark)}[/]")

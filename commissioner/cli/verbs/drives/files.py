@@ -11,6 +11,7 @@ from typing_extensions import TypedDict
 from commissioner.cli.screens import screen
 from commissioner.link.files.drive_file import known_drives, load_profile
 from commissioner.registers.profile import DriveProfile
+from commissioner.text import counted
 
 WORKS = {
     "excite": "run: the whole procedure at standstill",
@@ -71,7 +72,9 @@ def show_drive(name: str, *, as_json: bool) -> None:
     if as_json:
         screen.emit(_summary(name, profile) | {"unknown": dict(profile.unknown), "file": profile.file})
         return
-    screen.out.print(f"[bold]{escape(profile.name)}[/], {profile.kind.replace('_', ' ')}, {len(profile.items)} items")
+    screen.out.print(
+        f"[bold]{escape(profile.name)}[/], {profile.kind.replace('_', ' ')}, {counted(len(profile.items), 'item')}"
+    )
     rows = [("[green]✓[/]" if works else "[dim]–[/]", verb, escape(why)) for verb, works, why in works_with(profile)]
     screen.out.print(screen.table("", ("", "with this drive", ""), rows))
     for topic, sentence in sorted(profile.unknown.items()):
@@ -81,7 +84,7 @@ def show_drive(name: str, *, as_json: bool) -> None:
 def works_with(profile: DriveProfile) -> list[tuple[str, bool, str]]:
     """Each verb, whether it works with a drive of this file, and how far or why not."""
     readable = sum("r" in item.access for item in profile.items.values())
-    rows = [("check", readable > 0, f"{readable} values" if readable else "no register to read has a source")]
+    rows = [("check", readable > 0, counted(readable, "value") if readable else "no register to read has a source")]
     for capability, text in WORKS.items():
         works = capability in profile.capabilities
         rows.append((text, works, "" if works else profile.unknown.get(capability, "not in this file")))
@@ -102,7 +105,7 @@ def validate_drive(file: Path, *, as_json: bool) -> None:
     if as_json:
         screen.emit(document | _summary(str(file), profile))
         return
-    screen.out.print(f"[green]{document['reason']}[/]: {escape(profile.name)}, {len(profile.items)} items")
+    screen.out.print(f"[green]{document['reason']}[/]: {escape(profile.name)}, {counted(len(profile.items), 'item')}")
 
 
 def _summary(name: str, profile: DriveProfile) -> DriveRow:

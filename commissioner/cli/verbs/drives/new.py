@@ -21,6 +21,7 @@ from commissioner.link.wire.url import parse_url
 from commissioner.records import plain_name
 from commissioner.registers.profile import DriveProfile, Identity, LinkLimits
 from commissioner.registers.status import DriveState, decode_state
+from commissioner.text import counted
 
 
 def new_drive(url: str, out: Path, *, may_write: bool, as_json: bool) -> None:
@@ -44,7 +45,7 @@ def new_drive(url: str, out: Path, *, may_write: bool, as_json: bool) -> None:
         show_drive(str(out), as_json=True)
         return
     screen.out.print(
-        f"[green]{screen.text(str(out))}[/]: {len(profile.items)} items, read and proved; the rest is \\[unknown] in it"
+        f"[green]{screen.text(str(out))}[/]: {counted(len(profile.items), 'item')}, read and proved; the rest is \\[unknown] in it"
     )
     verbs = [
         "check",

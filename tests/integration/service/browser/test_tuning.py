@@ -51,7 +51,7 @@ def test_a_drive_tunes_itself_by_clicks_and_gets_its_old_values_back(bench, brow
         hand.wait_energised()
         hand.wait_said("The drive tunes itself at standstill")
         assert hand.violations() == [] and hand.fits()
-        expect(hand.page.locator("h1")).to_contain_text("tunings agree", timeout=SLOW_MS)
+        expect(hand.page.locator("h1")).to_contain_text("tuned itself", timeout=SLOW_MS)
         expect(hand.page.locator("main")).to_contain_text("As before, read back")
         assert hand.violations() == [] and hand.fits() and hand.complaints == []
     result = bench.wait_over(run)

@@ -4,6 +4,7 @@ import { number } from "./page.js";
 const points = JSON.parse(document.querySelector("#trenddata").textContent);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const times = points.map((point) => Date.parse(point.utc) / 1000);
+const day = times.at(-1) - times[0] > 3 * 86400 ? (utc) => utc.slice(0, 10) : (utc) => utc.slice(5, 16).replace("T", " ");
 
 for (const element of document.querySelectorAll("[data-trend]")) {
   const factor = Number(element.dataset.factor), values = points.map((p) => p.parameters[element.dataset.trend]);
@@ -25,8 +26,9 @@ for (const element of document.querySelectorAll("[data-trend]")) {
   const made = new uPlot({
     ...size(), padding: [null, 36, null, null], legend: { show: false }, cursor: { show: false },
     scales: { x: { time: true, range: [times[0] - pad, times.at(-1) + pad] }, y: { range: [low - margin, high + margin] } },
-    axes: [{ ...axis, size: 28, space: 90, values: (u, at) => at.map((t) => new Date(1000 * t).toISOString().slice(0, 10)) }, { ...axis, size: 56, values: (u, at) => at.map((v) => number(v, v < 10 ? 3 : v < 100 ? 2 : 1)) }],
+    axes: [{ ...axis, size: 28, space: 90, values: (u, at) => at.map((t) => day(new Date(1000 * t).toISOString())) }, { ...axis, size: 56, values: (u, at) => at.map((v) => number(v, v < 10 ? 3 : v < 100 ? 2 : 1)) }],
     series: [{}, { stroke: "transparent", width: 0, points: { show: false } }], hooks: { draw: [marks] },
   }, [times, y], element);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => made.redraw());
   new ResizeObserver(() => made.setSize(size())).observe(element);
 }

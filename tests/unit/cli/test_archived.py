@@ -1,0 +1,64 @@
+"""What the archive's verbs show on a narrow terminal."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from commissioner.cli.screens import screen
+from commissioner.cli.verbs.archived import deciding, runs, verify
+from commissioner.text import counted, did_you_mean
+
+
+@pytest.mark.parametrize(
+    "standing", ["commissioned", "accepted, not written", "commissioned, restored since", "faulted"]
+)
+def test_no_word_of_a_list_of_runs_is_broken_at_80_columns(monkeypatch, standing):
+    row = SimpleNamespace(
+        run="20261129-043338-simulated-3d243a", standing=standing, motor="", plate="2.2 kW, 400 V, 5 A, 1436 1/min",
+        drive="SIM-INV-7A #20250117", person="root", holds="",
+    )  # fmt: skip
+    monkeypatch.setattr(runs, "find_runs", lambda *_: SimpleNamespace(rows=[row], total=1))
+    monkeypatch.setattr(screen.out, "width", 80)
+    with screen.out.capture() as shown:
+        runs.list_runs(None, as_json=False, wanted=None)
+    wanted = f"{standing} {row.plate} {row.drive}".split()
+    assert set(wanted) <= set(shown.get().split())
+
+
+def test_what_holds_for_every_run_is_said_once(monkeypatch):
+    one = SimpleNamespace(
+        run="a", state="intact", usable="all", losses=(), seal="none", remarks=("no seal",), is_whole=True
+    )
+    monkeypatch.setattr(verify.archive, "verify_runs", lambda *_: [one, one])
+    with screen.out.capture() as shown:
+        verify.verify_runs(Path("runs"), None, everything=True, seal=None, as_json=False)
+    assert shown.get().count("intact") == 2
+    assert shown.get().count("no seal") == 1
+
+
+def test_one_is_no_plural():
+    assert (counted(0, "run"), counted(1, "run"), counted(2, "run")) == ("0 runs", "1 run", "2 runs")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("acuracy", "; did you mean 'accuracy'?"),
+        ("ACCURACY", "; did you mean 'accuracy'?"),
+        ("form", ""),
+        ("x", ""),
+        ("", ""),
+    ],
+)
+def test_only_one_name_that_is_near_is_asked_back(asked, said):
+    assert did_you_mean(asked, ("accuracy", "formats", "formulas")) == said
+
+
+def test_a_decision_that_comes_out_otherwise_is_told_at_the_place_that_differs():
+    archived = {"kind": "result", "record": {"outcome": "commissioned", "remarks": ["a", "b"]}}
+    replayed = {"kind": "result", "record": {"outcome": "commissioned", "remarks": ["a", "c", "d"]}}
+    assert deciding.apart(replayed, archived) == ("record.remarks.1", "c", "b")
+    assert deciding.apart({"x": [1]}, {"x": [1, 2]}) == ("x.1", None, 2)
+    assert deciding.apart("c", "b") == ("", "c", "b")
+    assert deciding.apart({"x": 1}, {}) == ("x", 1, None)
