@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from commissioner.errors import ConfigurationError
 from commissioner.motor.nameplate import RATED_VALUES
-from commissioner.registers.convention import INDUCTANCES, QUANTITIES, RESISTANCES
+from commissioner.registers.convention import INDUCTANCES, QUANTITIES, RESISTANCES, base_values
 from commissioner.registers.profile import CLAIM_ITEMS, COMMISSIONING_ITEMS, DriveProfile, Item, LinkLimits
 
 SMALLEST_SCALE, LARGEST_SCALE = 1e-9, 1e9
@@ -46,7 +46,7 @@ Problem = tuple[str, object, str]
 
 def check_contradictions(profile: DriveProfile) -> DriveProfile:
     """The profile itself. Raises ConfigurationError with the first thing that cannot be together with another."""
-    for check in (_limits, _bits, _units, _scales, _order, _supervision, _topics):
+    for check in (_limits, _bits, _units, _scales, _order, _bases, _supervision, _topics):
         for key, value, expected in check(profile):
             raise ConfigurationError(file=profile.file, key=key, value=value, expected=expected)
     return profile
@@ -119,6 +119,21 @@ def _order(profile: DriveProfile) -> Iterator[Problem]:
                 name,
                 f"each parameter once: parameters.order[{order.index(name)}] is it too",
             )
+
+
+def _bases(profile: DriveProfile) -> Iterator[Problem]:
+    """What is written in per cent, or as a reactance, is so much of what stands in the drive, which must be seen to be the job's motor."""
+    if profile.kind == "commissioning_map" or "write_back" not in profile.capabilities:
+        return
+    for item in map(profile.item, profile.parameter_names):
+        for name in base_values(item):
+            if name not in profile.items:
+                form = item.convention.replace("_", " ")
+                yield (
+                    f"items.{name}",
+                    None,
+                    f"a table for it: {item.name} is a {form}, which means nothing without the drive's own",
+                )
 
 
 def _supervision(profile: DriveProfile) -> Iterator[Problem]:

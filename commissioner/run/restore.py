@@ -15,7 +15,7 @@ from commissioner.link.files.drive_file import archived_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.records import ParameterSnapshot, WrittenParameter
-from commissioner.registers.codec import encode_item
+from commissioner.registers.codec import held_words
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.archive.documents import damaged, read_saved
@@ -138,8 +138,8 @@ def _check_known(
         known = [snapshot.in_use.get(name), snapshot.stored.get(name)]
         known += [values.get(key) for values in announced for key in (name, f"staged_{name}")]
         item = profile.item(name)
-        words = [encode_item(item, value) for value in known if isinstance(value, int | float)]
-        if encode_item(item, held) not in words:
+        words = [held_words(item, value) for value in known if isinstance(value, int | float)]
+        if held_words(item, held) not in words:
             raise IdentityMismatch(
                 f"the drive holds a {name} that this run neither found nor wrote", step="restore", value=held,
                 limit=" or ".join(dict.fromkeys(f"{v:.6g}" for v in known if isinstance(v, int | float))),

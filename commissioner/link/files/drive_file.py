@@ -220,7 +220,10 @@ def _address(table: ItemTable, wire: _Wire, key: str) -> int:
     """On the wire; beyond every register for what stands behind a mailbox."""
     if (table.address is None) == (table.parameter is None):
         raise ConfigurationError(
-            file=wire.file, key=f"{key}.address", value=table.address, expected="either an address or a parameter's number"
+            file=wire.file,
+            key=f"{key}.address",
+            value=table.address,
+            expected="either an address or a parameter's number",
         )
     if table.parameter is not None:
         return address_of(table.parameter, table.index)
@@ -236,7 +239,10 @@ def _window(table: WindowTable, wire: _Wire) -> WindowLayout:
     header = tuple((name, kind) for name, kind in (entry.split(":") for entry in table.header))
     if len(set(header)) != len(header) or header[-1][0] != "crc16":
         raise ConfigurationError(
-            file=wire.file, key="window.header", value=table.header, expected="each of the seven fields once, crc16 last"
+            file=wire.file,
+            key="window.header",
+            value=table.header,
+            expected="each of the seven fields once, crc16 last",
         )
     flags = {name: getattr(table, f"flag_{name}") for name in WINDOW_FLAGS}
     return WindowLayout(wire.at(table.address, "window.address"), header, table.data_registers, flags)
