@@ -87,6 +87,8 @@ class ModbusPort:
         self._own = frozenset(profile.exceptions)
         """Exceptions that mean what the drive file says: none is waited for because the protocol means busy by its number."""
         self._waited_for = NOT_CARRIED_OUT - self._own | frozenset(profile.link.busy_exceptions)
+        self._waited_for_twice = self._waited_for | MAY_BE_CARRIED_OUT - self._own
+        """Of what does no harm twice."""
         self._device = profile.link.device_id if url.device is None else url.device
         self._client = make_client(url, self._device)
         self._has_exchange = profile.link.has_read_write_multiple
@@ -243,7 +245,7 @@ class ModbusPort:
     # --- trust --------------------------------------------------------------------------------------------------------
     def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True, *, repeats: bool = False) -> Result:
         """`repeats`: it does no harm twice, so that it is asked again where it may have been carried out, too."""
-        waited_for = self._waited_for | MAY_BE_CARRIED_OUT - self._own if repeats else self._waited_for
+        waited_for = self._waited_for_twice if repeats else self._waited_for
         end = self._clock() + self.reply_timeout_s
         while True:
             if not self._client.connected:
@@ -280,6 +282,8 @@ class ModbusPort:
             self._url,
             turnaround_s=self._profile.link.turnaround_s,
             prove=self._prove,
+            busy=self._waited_for_twice,
+            busy_s=self.reply_timeout_s,
             stats=self.stats,
             sleep=self._sleep,
             clock=self._clock,
