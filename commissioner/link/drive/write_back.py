@@ -199,10 +199,10 @@ class WriteBack:
             self._way.let_jobs_end()
             self._bring_back(snapshot)
             fault = self._fault()
-            outcome, was_restored = "the values found before are in the drive again, verified", True
+            outcome, was_restored = "the values held before this write are in the drive again, verified", True
             outcome += f"; the drive reports: {fault}" if fault else ""
         except CommissionerError as second:
-            outcome, was_restored = f"the values found before could not be verified: {second.what}", False
+            outcome, was_restored = f"the values held before this write could not be verified: {second.what}", False
         failed = WriteBackFailed(
             f"writing back failed: {error.what}; {outcome}",
             step=error.step,

@@ -56,6 +56,9 @@ READ_REMEDIES = dict.fromkeys((1, 2, 3), _OTHER_FILE)
 READING = frozenset({3, 4})
 """Function codes that read registers."""
 REMEDIES = {
+    2: "it has no such register, or none that can be written: see that the drive file is this drive's, model and firmware",
+    3: "it takes no such value there: see the register's range in the manual, and address, width and scale in the drive file",
+    4: "it does not do this in its present state: see on its display whether it is stopped, unlocked and under bus control",
     5: "it stays at work longer than an answer may take: let its job end, then start again",
     6: "it stays busy: let what occupies it end, or disconnect the other master, then start again",
     10: _GATEWAY,
@@ -411,7 +414,7 @@ class ModbusPort:
     def _refused(self, what: str, code: int, *, is_read: bool) -> NoReturn:
         self.stats.refusals += 1
         meaning = self._exceptions.get(code, "a code the drive file does not explain")
-        remedies = REMEDIES | READ_REMEDIES if is_read and meaning == EXCEPTION_MEANINGS.get(code) else REMEDIES
+        remedies = {} if code in self._own else REMEDIES | READ_REMEDIES if is_read else REMEDIES
         raise RequestRefused(
             f"the drive refused to {what}: exception {code}, {meaning}",
             step=what,
