@@ -125,16 +125,20 @@ def _check_known(
     present: Mapping[str, float], snapshot: ParameterSnapshot, profile: DriveProfile, lines: list[dict[str, Any]]
 ) -> None:
     """IdentityMismatch where a value in use was neither found by this run nor announced by it."""
-    if any(line["kind"] == "tuning_began" for line in lines):
-        return  # what the drive found by itself nobody announced
-    announced = list(_announced(lines))
+    tuned = [line["record"]["values"] for line in lines if line["kind"] == "tuned_once"]
+    if len(tuned) < sum(_is_tuning(line) for line in lines):
+        return  # what the drive found by itself in a tuning that did not end as it should nobody has seen
+    announced = [*_announced(lines), *tuned]
     if (
         profile.parameters
         and profile.parameters.staged_crc
         and staged_words_crc(present, profile) in {values.get(profile.parameters.staged_crc) for values in announced}
     ):
         return  # a set that this run committed, also where parts of it lay staged before
+    changed = profile.tuning.also_changes if tuned and profile.tuning else ()
     for name, held in present.items():
+        if name in changed:
+            continue
         known = [snapshot.in_use.get(name), snapshot.stored.get(name)]
         known += [values.get(key) for values in announced for key in (name, f"staged_{name}")]
         item = profile.item(name)
@@ -143,9 +147,14 @@ def _check_known(
             raise IdentityMismatch(
                 f"the drive holds a {name} that this run neither found nor wrote", step="restore", value=held,
                 limit=" or ".join(dict.fromkeys(f"{v:.6g}" for v in known if isinstance(v, int | float))),
-                remedy="someone changed the drive after this run: restore the newest run of this drive first, or "
+                remedy="someone changed the drive after this run, or it is another drive of its type: restore the newest run of this drive first, or "
                 "enter the values at the drive",
             )  # fmt: skip
+
+
+def _is_tuning(line: dict[str, Any]) -> bool:
+    """Whether the drive was about to tune itself."""
+    return line["kind"] == "about_to" and isinstance(line["record"], dict) and line["record"].get("action") == "tune"
 
 
 def _announced(lines: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
