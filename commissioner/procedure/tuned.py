@@ -7,6 +7,7 @@ counts them where no source tells the unit.
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,6 +25,8 @@ SPREAD_PERCENT = 5.0
 """Largest minus smallest, of the median: a drive's own repeats differ by 1 ... 3 %; one that is wrong once by far more."""
 TREND_PERCENT = 3.0
 """Of a resistance over all repeats: copper gains 0.39 % a kelvin, so 8 K of heating."""
+FINE_COUNTS = 1000
+"""Steps of its register: a value of so many moves from tuning to tuning, which differ by 1 % and more."""
 FEWEST = 3
 """Repeats below which neither spread nor trend says anything."""
 
@@ -93,7 +96,10 @@ def judge_tunings(
     rows = tuple(_row(profile, name, repeats, before, medians, plate, earlier) for name in medians)
     return TuneVerdict(
         rows=rows,
-        objections=tuple(o for row in rows for o in _objections(row)),
+        objections=(
+            *(o for row in rows for o in _objections(profile.item(row.name), row)),
+            *_unchanged(profile, repeats, before),
+        ),
         best=min(repeats, key=lambda repeat: _distance(repeat, medians)),
         not_judged=tuple(row.name for row in rows if row.plate_low is None),
     )
@@ -167,7 +173,48 @@ def _distance(repeat: Mapping[str, float], medians: Mapping[str, float]) -> floa
     return sum(abs(_percent(repeat[name] - median, median)) for name, median in medians.items())
 
 
-def _objections(row: TunedRow) -> Iterator[Objection]:
+def _unchanged(
+    profile: DriveProfile, repeats: Sequence[Mapping[str, float]], before: Mapping[str, float]
+) -> Iterator[Objection]:
+    """Where every result is to the last digit what stood there before, in every repeat, the drive keeps elsewhere what it found, or
+    did not tune: as long as one of them is counted so finely that no second tuning meets it."""
+    seen = [(name, value, before[name]) for repeat in repeats for name, value in repeat.items()]
+    is_fine = any(_counts(profile.item(name), value) >= FINE_COUNTS for name, value, _ in seen)
+    if is_fine and all(value == old for _, value, old in seen):
+        yield Objection(
+            "the drive's tuning changed nothing: every result is what stood there before", f"{len(repeats)} x the same to the last digit",
+            "a tuning never finds every digit again",
+            "see on the drive's display whether it tuned, where it keeps what it found, and whether that must first be taken over",
+        )  # fmt: skip
+
+
+def _counts(item: Item, value: float) -> float:
+    """How many steps of its register a value is."""
+    return math.inf if item.type == "f32" else abs(value) / item.scale
+
+
+def _is_no_value(item: Item, value: float) -> bool:
+    """The ends of a register's range, signed or not: what drives show for 'not available' and what a value beyond it is clipped to."""
+    if item.type == "f32":
+        return False
+    bits = 16 * item.words
+    return round(value / item.scale) in (2**bits - 1, 2 ** (bits - 1) - 1, 2 ** (bits - 1), -(2 ** (bits - 1)), -1)
+
+
+def _objections(item: Item, row: TunedRow) -> Iterator[Objection]:
+    if any(_is_no_value(item, value) for value in row.values):
+        yield Objection(
+            f"{plain_name(row.name)} stands at an end of its register", row.median, "a value inside its range",
+            "drives show so that they have no value, or more than the register holds: look at the drive's display",
+        )  # fmt: skip
+        return
+    low, high = item.minimum, item.maximum
+    if not (-math.inf if low is None else low) <= row.median <= (math.inf if high is None else high):
+        yield Objection(
+            f"{plain_name(row.name)} is none that the drive file allows", row.median, f"{low} ... {high}",
+            "check the item's address, width and scale in the drive file",
+        )  # fmt: skip
+        return
     if row.median <= 0.0:
         yield Objection(
             f"{plain_name(row.name)} is not a motor's", row.median, "above 0",

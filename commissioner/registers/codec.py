@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from fastcrc import crc16
 
@@ -50,6 +51,15 @@ def encode_item(item: Item, value: Value) -> Words:
     return tuple(word for element in padded for word in _encode_element(item, element))
 
 
+def held_words(item: Item, value: Value) -> Words:
+    """The words by which the drive held `value`, which was read from it: what the file allows of new values, and that a float is no
+    number, does not matter to what is compared or given back. UsageError where no words of the item can be read as it."""
+    if isinstance(value, float) and item.type == "f32" and not math.isfinite(value):
+        words = struct.unpack(">2H", struct.pack(">f", value))
+        return words if item.word_order == "big" else words[::-1]
+    return encode_item(replace(item, minimum=None, maximum=None), value)
+
+
 def decode_span(span: Span, words: Sequence[int]) -> dict[str, Value]:
     """Every item of the span by name."""
     return {
@@ -58,9 +68,9 @@ def decode_span(span: Span, words: Sequence[int]) -> dict[str, Value]:
     }
 
 
-def encode_span(span: Span, values: Mapping[str, Value]) -> Words:
+def encode_span(span: Span, values: Mapping[str, Value], encode: Callable[[Item, Value], Words] = encode_item) -> Words:
     """The span's words, from the values of all its items."""
-    return tuple(word for item in span.items for word in encode_item(item, values[item.name]))
+    return tuple(word for item in span.items for word in encode(item, values[item.name]))
 
 
 def crc16_modbus(words: Sequence[int]) -> int:

@@ -10,8 +10,16 @@ from types import MappingProxyType
 
 from commissioner.errors import ConfigurationError
 from commissioner.motor.nameplate import RATED_VALUES
-from commissioner.registers.convention import INDUCTANCES, QUANTITIES, RESISTANCES
-from commissioner.registers.profile import CLAIM_ITEMS, COMMISSIONING_ITEMS, DriveProfile, Item, LinkLimits
+from commissioner.registers.convention import INDUCTANCES, QUANTITIES, RESISTANCES, base_values
+from commissioner.registers.profile import (
+    CLAIM_ITEMS,
+    COMMISSIONING_ITEMS,
+    IDENTITY_ITEMS,
+    STATUS_ITEMS,
+    DriveProfile,
+    Item,
+    LinkLimits,
+)
 
 SMALLEST_SCALE, LARGEST_SCALE = 1e-9, 1e9
 NO_UNIT = ("", "raw")
@@ -25,6 +33,13 @@ UNIT_OF_ENDING = MappingProxyType(
 """How a name ends -> its unit; the first that fits."""
 UNIT_OF_WORD = MappingProxyType({"voltage": "V", "current": "A", "power": "W"})
 """Words by which a last letter is a phase's, not a unit's: `motor_current_v` is a current."""
+CODES = (
+    "status_word", "interlocks", "fault_code", "trip_cause", "settings_count", "serial_number", "firmware_version", "map_version",
+    "heartbeat_echo", "session_id", "samples_produced", "overruns", "store_count",
+)  # fmt: skip
+"""Items that are read by their bits, as codes or as counts."""
+MEASURED = tuple(name for name in (*IDENTITY_ITEMS, *STATUS_ITEMS) if name not in ("drive_type", "magic"))
+"""What else of identity and status is a number."""
 TIMES = ("s", "ms")
 UNITS_OF_QUANTITY: Mapping[str, tuple[str, ...]] = MappingProxyType(
     dict.fromkeys(RESISTANCES, ("ohm", "%"))
@@ -46,7 +61,7 @@ Problem = tuple[str, object, str]
 
 def check_contradictions(profile: DriveProfile) -> DriveProfile:
     """The profile itself. Raises ConfigurationError with the first thing that cannot be together with another."""
-    for check in (_limits, _bits, _units, _scales, _order, _supervision, _topics):
+    for check in (_limits, _bits, _units, _scales, _order, _numbers, _written, _bases, _supervision, _topics):
         for key, value, expected in check(profile):
             raise ConfigurationError(file=profile.file, key=key, value=value, expected=expected)
     return profile
@@ -119,6 +134,71 @@ def _order(profile: DriveProfile) -> Iterator[Problem]:
                 name,
                 f"each parameter once: parameters.order[{order.index(name)}] is it too",
             )
+
+
+def _numbers(profile: DriveProfile) -> Iterator[Problem]:
+    """What is read as one number is one; what is read by its bits or as a code is counted as it stands."""
+    watchdog = [profile.watchdog.register] if profile.watchdog else []
+    for name in dict.fromkeys(
+        (*CODES, *MEASURED, *RATED_VALUES, "pole_pairs", "pole_count", *profile.parameter_names, *watchdog)
+    ):
+        item = profile.items.get(name)
+        if item is None:
+            continue
+        key = f"items.{name}"
+        if item.type == "ascii":
+            yield f"{key}.type", item.type, "a number's type"
+        if item.length != 1:
+            yield f"{key}.length", item.length, "1: it is one number"
+        if name in CODES and item.type == "f32":
+            yield f"{key}.type", item.type, "a whole number's type: it is read by its bits, as a code or as a count"
+        if name in CODES and item.scale != 1.0:
+            yield f"{key}.scale", item.scale, "1: it is read by its bits, as a code or as a count"
+        if "r" not in item.access:
+            yield f"{key}.access", item.access, "'r' or 'rw': it is read"
+
+
+def _written(profile: DriveProfile) -> Iterator[Problem]:
+    """What a drive without staging is given and gets back can be written; nothing else is written over it."""
+    group = profile.parameters
+    if group is None or group.is_staged or not profile.capabilities & {"write_back", "restore"}:
+        return
+    for k, name in enumerate(group.order):
+        if profile.items[name].access != "rw":
+            yield (
+                f"parameters.order[{k}]",
+                name,
+                f"an item that can be written: items.{name}.access is {profile.items[name].access!r}",
+            )
+    unlock, store = profile.unlock, profile.store
+    bare = {
+        "unlock.writes": unlock.writes if unlock else (), "unlock.locks": unlock.locks if unlock else (),
+        "parameters.enter": group.enter, "store.writes": store.writes if store else (),
+    }  # fmt: skip
+    for key, writes in bare.items():
+        for address, _ in writes:
+            for item in map(profile.item, group.order):
+                if item.address <= address < item.end:
+                    yield (
+                        key,
+                        address,
+                        f"a register of its own: items.{item.name} stands there, and would be written over",
+                    )
+
+
+def _bases(profile: DriveProfile) -> Iterator[Problem]:
+    """What is written in per cent, or as a reactance, is so much of what stands in the drive, which must be seen to be the job's motor."""
+    if profile.kind == "commissioning_map" or "write_back" not in profile.capabilities:
+        return
+    for item in map(profile.item, profile.parameter_names):
+        for name in base_values(item):
+            if name not in profile.items:
+                form = item.convention.replace("_", " ")
+                yield (
+                    f"items.{name}",
+                    None,
+                    f"a table for it: {item.name} is a {form}, which means nothing without the drive's own",
+                )
 
 
 def _supervision(profile: DriveProfile) -> Iterator[Problem]:

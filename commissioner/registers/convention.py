@@ -18,11 +18,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Protocol
 
-from commissioner.errors import UsageError
+from commissioner.errors import CheckFailed, UsageError
 from commissioner.motor.circuit import Gamma as GammaCircuit
 from commissioner.motor.circuit import InverseGamma, from_t_model
 from commissioner.motor.nameplate import Nameplate, prior
@@ -56,6 +56,12 @@ UNITS = frozenset(
 never converted."""
 
 
+BASE_VALUES = ("rated_voltage_v", "rated_current_a", "rated_frequency_hz")
+"""What per cent and reactances are of."""
+COARSEST = 0.1
+"""Largest part of a value that its register's steps may take from it or add: more, and it is rather the file's scale that is wrong."""
+
+
 class Rated(Protocol):
     """A motor's rated values, as far as they are known: a nameplate's, or those of a document's example."""
 
@@ -85,6 +91,16 @@ class Written:
     refused: Mapping[str, str]
 
 
+def as_in_drive(plate: Nameplate, held: Mapping[str, float]) -> Nameplate:
+    """The plate with the rated values that the drive itself holds (`held`, by their names): its per cent are of those, and its reactances
+    at that frequency, also where they differ from the job's plate as much as a check allows."""
+    volts, amperes, hertz = (
+        held[name] if math.isfinite(held.get(name, math.nan)) and held[name] > 0.0 else getattr(plate, name)
+        for name in BASE_VALUES
+    )
+    return replace(plate, rated_voltage_v=volts, rated_current_a=amperes, rated_frequency_hz=hertz)
+
+
 def drive_values(profile: DriveProfile, circuit: InverseGamma, nameplate: Nameplate | None = None) -> Written:
     """The circuit as the drive wants it. Items the file does not know are refused by its own sentence; what stands for no
     quantity of the circuit (the kind of a tuning) stays as it is."""
@@ -93,6 +109,8 @@ def drive_values(profile: DriveProfile, circuit: InverseGamma, nameplate: Namepl
     items = [profile.item(name) for name in order]
     meant = [item for item in items if item.convention or (item.quantity or item.name) in QUANTITIES]
     values = {item.name: drive_value(item, circuit, nameplate) for item in meant}
+    for item in meant:
+        _check_resolution(item, values[item.name])
     return Written(values, refused)
 
 
@@ -110,6 +128,17 @@ def drive_value(item: Item, circuit: InverseGamma, nameplate: Nameplate | None =
             remedy="give the item a quantity and a convention that belong together",
         )
     return known[quantity] * representation_factor(quantity, form, nameplate)
+
+
+def _check_resolution(item: Item, value: float) -> None:
+    """CheckFailed where the register's steps are so coarse that another value would stand in the drive."""
+    if item.type == "f32" or abs(round(value / item.scale) * item.scale - value) <= COARSEST * abs(value):
+        return
+    raise CheckFailed(
+        f"{item.name} cannot stand in the drive as it is: its register counts in steps of {item.scale:g} {item.unit}",
+        step="convert to the drive's convention", value=round(value / item.scale) * item.scale, limit=f"{value:.4g} {item.unit} within {COARSEST:.0%}",
+        remedy="check the item's scale in the drive file; where it is right, see the manual for a finer register, or enter the value at the keypad",
+    )  # fmt: skip
 
 
 def per_phase_value(item: Item, value: float, rated: Rated | None) -> float:
@@ -218,6 +247,15 @@ def representation_factor(quantity: str, form: str, rated: Rated | None) -> floa
         (frequency_hz,) = _known(rated, quantity, form, "rated_frequency_hz")
         factor *= 2 * math.pi * frequency_hz
     return factor
+
+
+def base_values(item: Item) -> tuple[str, ...]:
+    """The rated values without which an item's convention means nothing."""
+    quantity, form = item.quantity or item.name, CONVENTIONS.get(item.convention, ("", ""))[1]
+    is_percent, is_inductance = form == "percent_of_base_impedance", quantity in INDUCTANCES
+    if quantity == "rotor_time_constant" or not (is_percent or form == "reactance_at_rated_frequency"):
+        return ()
+    return (*(BASE_VALUES[:2] if is_percent else ()), *(BASE_VALUES[2:] if is_inductance else ()))
 
 
 def _known(rated: Rated | None, quantity: str, form: str, *names: str) -> list[float]:

@@ -15,7 +15,7 @@ from commissioner.link.files.drive_file import archived_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.records import ParameterSnapshot, WrittenParameter, plain_name
-from commissioner.registers.codec import encode_item
+from commissioner.registers.codec import held_words
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.archive.documents import damaged, read_saved
@@ -125,27 +125,36 @@ def _check_known(
     present: Mapping[str, float], snapshot: ParameterSnapshot, profile: DriveProfile, lines: list[dict[str, Any]]
 ) -> None:
     """IdentityMismatch where a value in use was neither found by this run nor announced by it."""
-    if any(line["kind"] == "tuning_began" for line in lines):
-        return  # what the drive found by itself nobody announced
-    announced = list(_announced(lines))
+    tuned = [line["record"]["values"] for line in lines if line["kind"] == "tuned_once"]
+    if len(tuned) < sum(_is_tuning(line) for line in lines):
+        return  # what the drive found by itself in a tuning that did not end as it should nobody has seen
+    announced = [*_announced(lines), *tuned]
     if (
         profile.parameters
         and profile.parameters.staged_crc
         and staged_words_crc(present, profile) in {values.get(profile.parameters.staged_crc) for values in announced}
     ):
         return  # a set that this run committed, also where parts of it lay staged before
+    changed = profile.tuning.also_changes if tuned and profile.tuning else ()
     for name, held in present.items():
+        if name in changed:
+            continue
         known = [snapshot.in_use.get(name), snapshot.stored.get(name)]
         known += [values.get(key) for values in announced for key in (name, f"staged_{name}")]
         item = profile.item(name)
-        words = [encode_item(item, value) for value in known if isinstance(value, int | float)]
-        if encode_item(item, held) not in words:
+        words = [held_words(item, value) for value in known if isinstance(value, int | float)]
+        if held_words(item, held) not in words:
             raise IdentityMismatch(
                 f"the drive holds a {plain_name(name)} that this run neither found nor wrote", step="restore", value=held, unit=item.unit,
                 limit=" or ".join(dict.fromkeys(f"{v:.6g} {item.unit}".strip() for v in known if isinstance(v, int | float))),
-                remedy="someone changed the drive after this run: restore the newest run of this drive first, or "
+                remedy="someone changed the drive after this run, or it is another drive of its type: restore the newest run of this drive first, or "
                 "enter the values at the drive",
             )  # fmt: skip
+
+
+def _is_tuning(line: dict[str, Any]) -> bool:
+    """Whether the drive was about to tune itself."""
+    return line["kind"] == "about_to" and isinstance(line["record"], dict) and line["record"].get("action") == "tune"
 
 
 def _announced(lines: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:

@@ -19,7 +19,7 @@ from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.records import DriveIdentity, ParameterSnapshot, drive_words
-from commissioner.registers.convention import drive_values, our_values
+from commissioner.registers.convention import as_in_drive, drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import PlanRow, WritePlan
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
@@ -80,12 +80,17 @@ class _Ready:
     plate: Nameplate
     snapshot: ParameterSnapshot
 
+    @property
+    def base(self) -> Nameplate:
+        """The plate that the drive's own per cent and reactances are of."""
+        return as_in_drive(self.plate, self.snapshot.plate)
+
 
 def plan_write_back(run: RunSummary, url: str | None) -> Plan:
     """What writing this run's result would change. Reads the drive, changes nothing."""
     ready, circuit = _ready(run, url), _circuit(run)
     with _drive(ready) as inverter:
-        plan = _plan(run, ready, inverter, "write back", drive_values(ready.profile, circuit, ready.plate).values)
+        plan = _plan(run, ready, inverter, "write back", drive_values(ready.profile, circuit, ready.base).values)
     return replace(plan, holds_for_stator_flux_wb=flux_level(run.parameters))
 
 
@@ -103,7 +108,7 @@ def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, f
     with _drive(ready) as inverter:
         _require_the_runs_drive(inverter, ready, "compare")
         snapshot = inverter.snapshot()
-    ours = our_values(ready.profile, snapshot.in_use, ready.plate)
+    ours = our_values(ready.profile, snapshot.in_use, ready.base)
     held = {one.field: one.value for one in ours.values()}
     return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
@@ -126,7 +131,7 @@ def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
         inverter = Inverter(port, ready.profile, lambda intent: journal.journal("about_to", intent, durable=True))
         with closing(port), Mastery(inverter, lock) as mastery:
             mastery.take(inverter.identify())
-            wanted = drive_values(ready.profile, circuit, ready.plate).values
+            wanted = drive_values(ready.profile, circuit, ready.base).values
             check_token(_plan(run, ready, inverter, "write back", wanted), token)
             try:
                 report = inverter.write_circuit(circuit, ready.plate, ready.snapshot)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from commissioner.errors import DriveFault, ForeignMaster
-from commissioner.registers.codec import Value, encode_item
+from commissioner.registers.codec import Value, held_words
 from commissioner.registers.profile import DriveProfile, Span
 
 GUARDED = (
@@ -105,7 +105,7 @@ class Watched:
 
     def _same(self, name: str, first: Value, second: Value) -> bool:
         item = self._profile.item(name)
-        return encode_item(item, first) == encode_item(item, second)
+        return held_words(item, first) == held_words(item, second)
 
 
 def _has_restarted(held: Mapping[str, Value], ours: Mapping[str, Value]) -> bool:

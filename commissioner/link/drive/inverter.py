@@ -32,7 +32,7 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot
 from commissioner.registers.codec import Value
-from commissioner.registers.convention import drive_values, parameter_limits
+from commissioner.registers.convention import as_in_drive, drive_values, parameter_limits
 from commissioner.registers.profile import DriveProfile, Watchdog, WindowLayout
 from commissioner.registers.status import DriveState
 from commissioner.registers.tuning import Tuning
@@ -272,7 +272,7 @@ class Inverter:
         doubtful = self.implausible(snapshot.in_use, nameplate)
         if doubtful:
             raise doubtful[0].as_error()
-        written = drive_values(self.profile, circuit, nameplate)
+        written = drive_values(self.profile, circuit, as_in_drive(nameplate, snapshot.plate))
         return self.write_parameters(written.values, snapshot, store=store)
 
     def keep_tuned(self, values: Mapping[str, float], snapshot: ParameterSnapshot) -> WriteReport:

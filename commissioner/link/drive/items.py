@@ -9,7 +9,7 @@ from commissioner.errors import DriveFault, LinkError, ReplyMismatch, ReplyTimeo
 from commissioner.link.drive.foreign import Watched
 from commissioner.link.drive.ordinary.mailbox import behind_mailbox
 from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, Port, Words
-from commissioner.registers.codec import Value, decode_item, decode_span, encode_item, encode_span
+from commissioner.registers.codec import Value, decode_item, decode_span, encode_span, held_words
 from commissioner.registers.profile import DriveProfile, Span, plan_spans
 
 
@@ -44,6 +44,11 @@ class Items:
         for span in self._spans(values):
             self._write(span, values)
 
+    def give_back(self, name: str, value: Value) -> None:
+        """As `write`: a value that was read from the drive, or was seen to fit."""
+        for span in self._spans({name: value}):
+            self._send(span, {name: value}, encode_span(span, {name: value}, held_words))
+
     def write_verified(self, values: Mapping[str, Value], step: str) -> None:
         """Write and read back; where the answer was lost, what the drive holds tells whether it was written.
 
@@ -74,7 +79,7 @@ class Items:
     def same_words(self, name: str, first: Value, second: Value) -> bool:
         """True where both values are the same in the drive's own resolution."""
         item = self.profile.item(name)
-        return encode_item(item, first) == encode_item(item, second)
+        return held_words(item, first) == held_words(item, second)
 
     def _try_to_write(self, span: Span, values: Mapping[str, Value]) -> LinkError | None:
         """What lost the answer; None where there was one."""
@@ -87,11 +92,14 @@ class Items:
     def as_held(self, name: str, value: Value) -> Value:
         """The value as the drive's own words hold it."""
         item = self.profile.item(name)
-        return decode_item(item, encode_item(item, value))
+        return decode_item(item, held_words(item, value))
 
     def _write(self, span: Span, values: Mapping[str, Value]) -> None:
+        self._send(span, values, encode_span(span, values))
+
+    def _send(self, span: Span, values: Mapping[str, Value], words: Words) -> None:
         try:
-            self.port.write(span.address, encode_span(span, values))
+            self.port.write(span.address, words)
         except RequestRefused as refused:
             self.watched.look_again()
             if refused.value not in MAY_BE_CARRIED_OUT or refused.value in self.profile.exceptions:

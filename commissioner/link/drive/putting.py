@@ -131,7 +131,7 @@ class Direct:
     def _write(self, name: str, value: Value) -> None:
         """Where the answer is lost the drive is looked at, not written again: the value may have arrived."""
         try:
-            self._items.write({name: value})
+            self._items.give_back(name, value)
         except (ReplyTimeout, ReplyMismatch):
             if self._sets.group.enter or not self._items.same_words(name, self._items.read([name])[name], value):
                 raise

@@ -6,6 +6,7 @@ one by one; there the report of a failure names what it holds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -58,6 +59,7 @@ class WriteBack:
         """`values` in use, and stored if asked; `always`: also where the drive has them in use already, by its own doing.
         Nothing is written where the drive is not as in the snapshot."""
         target = self._sets.complete(values, snapshot.in_use)
+        check_can_be_given_back(snapshot)
         present = self._check_present(snapshot, snapshot.in_use, snapshot.stored)
         self._check_stopped()
         if store:
@@ -197,10 +199,10 @@ class WriteBack:
             self._way.let_jobs_end()
             self._bring_back(snapshot)
             fault = self._fault()
-            outcome, was_restored = "the values found before are in the drive again, verified", True
+            outcome, was_restored = "the values held before this write are in the drive again, verified", True
             outcome += f"; the drive reports: {fault}" if fault else ""
         except CommissionerError as second:
-            outcome, was_restored = f"the values found before could not be verified: {second.what}", False
+            outcome, was_restored = f"the values held before this write could not be verified: {second.what}", False
         failed = WriteBackFailed(
             f"writing back failed: {error.what}; {outcome}",
             step=error.step,
@@ -229,6 +231,17 @@ class WriteBack:
             endurance_writes=store.endurance_writes if store else None,
             fault=self._fault(),
         )
+
+
+def check_can_be_given_back(snapshot: ParameterSnapshot) -> None:
+    """CheckFailed where the drive shows no number for a parameter: no archive could bring it back."""
+    for name, value in snapshot.in_use.items():
+        if not math.isfinite(value):
+            raise CheckFailed(
+                f"the drive shows no number as {name}: it could not be given back", step="look at what the drive holds",
+                value="not a number", limit="a number", remedy="check the item's type, word order and address in the drive file; where the drive has "
+                "no value yet, enter one at the keypad first",
+            )  # fmt: skip
 
 
 def _key(identity: DriveIdentity) -> DriveIdentity:

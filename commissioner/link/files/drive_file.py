@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -106,7 +106,25 @@ def _locate(name_or_path: str) -> Path:
     raise no_such_name("drive", name_or_path, known_drives())
 
 
+@dataclass(frozen=True)
+class _Wire:
+    """From the numbers that a file writes to those of the wire."""
+
+    base: int
+    file: str
+
+    def at(self, number: int, key: str) -> int:
+        if number < self.base:
+            raise ConfigurationError(file=self.file, key=key, value=number, expected="1 or more: base is 1")
+        return number - self.base
+
+    def pairs(self, writes: Sequence[Sequence[int]], key: str) -> tuple[tuple[int, int], ...]:
+        """Register and value of each."""
+        return tuple((self.at(number, f"{key}[{k}]"), value) for k, (number, value) in enumerate(writes))
+
+
 def _profile(model: DriveFile, file: str) -> DriveProfile:
+    wire = _Wire(model.link.address_base, file)
     return DriveProfile(
         file=file,
         name=model.drive.name,
@@ -117,9 +135,9 @@ def _profile(model: DriveFile, file: str) -> DriveProfile:
         identity=Identity(**model.identity.model_dump()),
         items={name: _item(name, table, model.link, file) for name, table in model.items.items()},
         watchdog=_watchdog(model.watchdog) if model.watchdog else None,
-        window=_window(model.window, file) if model.window else None,
-        parameters=_parameters(model.parameters) if model.parameters else None,
-        store=_store(model.store) if model.store else None,
+        window=_window(model.window, wire) if model.window else None,
+        parameters=_parameters(model.parameters, wire) if model.parameters else None,
+        store=_store(model.store, wire) if model.store else None,
         commands={name: word for name, word in model.commands.model_dump().items() if word is not None},
         status_bits=_status_bits(model, file),
         interlock_bits=model.interlock_bits,
@@ -129,8 +147,8 @@ def _profile(model: DriveFile, file: str) -> DriveProfile:
         limits=DriveLimits(**model.limits.model_dump()),
         unknown=model.unknown,
         worked=tuple(_worked(table) for table in model.worked),
-        unlock=_unlock(model.unlock, file) if model.unlock else None,
-        mailbox=_mailbox(model.mailbox, model.link.address_base, file) if model.mailbox else None,
+        unlock=_unlock(model.unlock, wire) if model.unlock else None,
+        mailbox=_mailbox(model.mailbox, wire) if model.mailbox else None,
     )
 
 
@@ -148,15 +166,16 @@ def _worked(table: WorkedTable) -> Worked:
     return Worked(**values, words=tuple(table.words), request=tuple(table.request))
 
 
-def _unlock(table: UnlockTable, file: str) -> Unlock:
-    _refuse_lead("unlock.source", table.source, file)
-    return Unlock(tuple((a, v) for a, v in table.writes), tuple((a, v) for a, v in table.locks))
+def _unlock(table: UnlockTable, wire: _Wire) -> Unlock:
+    _refuse_lead("unlock.source", table.source, wire.file)
+    return Unlock(wire.pairs(table.writes, "unlock.writes"), wire.pairs(table.locks, "unlock.locks"))
 
 
-def _mailbox(table: MailboxTable, base: int, file: str) -> Mailbox:
-    _refuse_lead("mailbox.source", table.source, file)
+def _mailbox(table: MailboxTable, wire: _Wire) -> Mailbox:
+    _refuse_lead("mailbox.source", table.source, wire.file)
     values = table.model_dump(include={"registers", "data_set", "drive_object", "within_s"})
-    return Mailbox(address=table.address - base, errors=_by_code(table.errors, "mailbox.errors", file), **values)
+    errors = _by_code(table.errors, "mailbox.errors", wire.file)
+    return Mailbox(address=wire.at(table.address, "mailbox.address"), errors=errors, **values)
 
 
 def _refuse_lead(key: str, source: str, file: str) -> None:
@@ -168,7 +187,7 @@ def _refuse_lead(key: str, source: str, file: str) -> None:
 
 def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     key = f"items.{name}"
-    address = _address(table, link.address_base, key, file)
+    address = _address(table, _Wire(link.address_base, file), key)
     for what, value, known in (
         ("convention", table.convention, CONVENTIONS),
         ("quantity", table.quantity, QUANTITIES),
@@ -196,42 +215,47 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     )
 
 
-def _address(table: ItemTable, base: int, key: str, file: str) -> int:
+def _address(table: ItemTable, wire: _Wire, key: str) -> int:
     """On the wire; beyond every register for what stands behind a mailbox."""
     if (table.address is None) == (table.parameter is None):
         raise ConfigurationError(
-            file=file, key=f"{key}.address", value=table.address, expected="either an address or a parameter's number"
+            file=wire.file,
+            key=f"{key}.address",
+            value=table.address,
+            expected="either an address or a parameter's number",
         )
     if table.parameter is not None:
         return address_of(table.parameter, table.index)
     assert table.address is not None
-    if table.address < base:
-        raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
-    return table.address - base
+    return wire.at(table.address, f"{key}.address")
 
 
 def _watchdog(table: WatchdogTable) -> Watchdog:
     return Watchdog(register=table.register_name, **table.model_dump(exclude={"register_name"}))
 
 
-def _window(table: WindowTable, file: str) -> WindowLayout:
+def _window(table: WindowTable, wire: _Wire) -> WindowLayout:
     header = tuple((name, kind) for name, kind in (entry.split(":") for entry in table.header))
     if len(set(header)) != len(header) or header[-1][0] != "crc16":
         raise ConfigurationError(
-            file=file, key="window.header", value=table.header, expected="each of the seven fields once, crc16 last"
+            file=wire.file,
+            key="window.header",
+            value=table.header,
+            expected="each of the seven fields once, crc16 last",
         )
     flags = {name: getattr(table, f"flag_{name}") for name in WINDOW_FLAGS}
-    return WindowLayout(table.address, header, table.data_registers, flags)
+    return WindowLayout(wire.at(table.address, "window.address"), header, table.data_registers, flags)
 
 
-def _parameters(table: ParametersTable) -> ParameterGroup:
-    return ParameterGroup(tuple(table.order), table.staged_crc, table.settle_s, tuple((a, v) for a, v in table.enter))
+def _parameters(table: ParametersTable, wire: _Wire) -> ParameterGroup:
+    enter = wire.pairs(table.enter, "parameters.enter")
+    return ParameterGroup(tuple(table.order), table.staged_crc, table.settle_s, enter)
 
 
-def _store(table: StoreTable) -> Store:
-    writes = tuple((a, v) for a, v in table.writes)
-    done = (table.done[0], table.done[1]) if table.done else None
-    return Store(table.endurance_writes, writes, table.coil, done, table.within_s)
+def _store(table: StoreTable, wire: _Wire) -> Store:
+    done = wire.pairs([table.done], "store.done")[0] if table.done else None
+    coil = None if table.coil is None else wire.at(table.coil, "store.coil")
+    return Store(table.endurance_writes, wire.pairs(table.writes, "store.writes"), coil, done, table.within_s)
 
 
 def _tuning(table: TuneTable, file: str) -> Tuning:

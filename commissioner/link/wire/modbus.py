@@ -57,6 +57,9 @@ READ_REMEDIES = dict.fromkeys((1, 2, 3), _OTHER_FILE)
 READING = frozenset({3, 4})
 """Function codes that read registers."""
 REMEDIES = {
+    2: "it has no such register, or none that can be written: see that the drive file is this drive's, model and firmware",
+    3: "it takes no such value there: see the register's range in the manual, and address, width and scale in the drive file",
+    4: "it does not do this in its present state: see on its display whether it is stopped, unlocked and under bus control",
     5: "it stays at work longer than an answer may take: let its job end, then start again",
     6: "it stays busy: let what occupies it end, or disconnect the other master, then start again",
     10: _GATEWAY,
@@ -88,6 +91,8 @@ class ModbusPort:
         self._own = frozenset(profile.exceptions)
         """Exceptions that mean what the drive file says: none is waited for because the protocol means busy by its number."""
         self._waited_for = NOT_CARRIED_OUT - self._own | frozenset(profile.link.busy_exceptions)
+        self._waited_for_twice = self._waited_for | MAY_BE_CARRIED_OUT - self._own
+        """Of what does no harm twice."""
         self._device = profile.link.device_id if url.device is None else url.device
         self._client = make_client(url, self._device)
         self._has_exchange = profile.link.has_read_write_multiple
@@ -244,7 +249,7 @@ class ModbusPort:
     # --- trust --------------------------------------------------------------------------------------------------------
     def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True, *, repeats: bool = False) -> Result:
         """`repeats`: it does no harm twice, so that it is asked again where it may have been carried out, too."""
-        waited_for = self._waited_for | MAY_BE_CARRIED_OUT - self._own if repeats else self._waited_for
+        waited_for = self._waited_for_twice if repeats else self._waited_for
         end = self._clock() + self.reply_timeout_s
         while True:
             if not self._client.connected:
@@ -281,6 +286,8 @@ class ModbusPort:
             self._url,
             turnaround_s=self._profile.link.turnaround_s,
             prove=self._prove,
+            busy=self._waited_for_twice,
+            busy_s=self.reply_timeout_s,
             stats=self.stats,
             sleep=self._sleep,
             clock=self._clock,
@@ -408,7 +415,7 @@ class ModbusPort:
     def _refused(self, what: str, code: int, *, is_read: bool) -> NoReturn:
         self.stats.refusals += 1
         meaning = self._exceptions.get(code, "a code the drive file does not explain")
-        remedies = REMEDIES | READ_REMEDIES if is_read and meaning == EXCEPTION_MEANINGS.get(code) else REMEDIES
+        remedies = {} if code in self._own else REMEDIES | READ_REMEDIES if is_read else REMEDIES
         raise RequestRefused(
             f"the drive refused to {what}: exception {code}, {meaning}",
             step=what,

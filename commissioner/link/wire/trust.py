@@ -84,7 +84,8 @@ class ConnectionTrust:
 
 
 class SerialTrust:
-    """A serial line: in step, watched, or in doubt. It starts in doubt: the last master may have left answers."""
+    """A serial line: in step, watched, or in doubt. It starts in doubt: the last master may have left answers. `busy`: refusals that
+    are waited out where the line is proved, for at most `busy_s`."""
 
     def __init__(
         self,
@@ -93,6 +94,8 @@ class SerialTrust:
         *,
         turnaround_s: float,
         prove: Callable[[], None],
+        busy: frozenset[int],
+        busy_s: float,
         stats: LinkStats,
         sleep: Callable[[float], None],
         clock: Callable[[], float],
@@ -100,6 +103,7 @@ class SerialTrust:
         self._client, self._url = client, url
         self._quiet_s = turnaround_s + MAX_FRAME_CHARACTERS * url.character_s
         self._prove, self._stats = prove, stats
+        self._busy, self._busy_s = busy, busy_s
         self._sleep, self._clock = sleep, clock
         self._debts = Debts(clock)
         self._asked: Shape = ()
@@ -153,18 +157,25 @@ class SerialTrust:
             )
 
     def _prove_step(self) -> None:
-        """A late refusal in the token's place proves as little as any other late answer."""
-        try:
-            self._prove()
-        except RequestRefused as refused:
-            self.doubt()
-            raise ReplyMismatch(
-                "the token was refused",
-                step="prove the line",
-                value=refused.value,
-                limit="the token back",
-                remedy="a late refusal or a second master; the line is brought back into step",
-            ) from refused
+        """A late refusal in the token's place proves as little as any other late answer. One that says busy is waited out, each time
+        with the silence after which nothing old is left: many a drive is busy for a while after every write."""
+        end = self._clock() + self._busy_s
+        while True:
+            try:
+                self._prove()
+                return
+            except RequestRefused as refused:
+                if refused.value not in self._busy or self._clock() > end:
+                    self.doubt()
+                    raise ReplyMismatch(
+                        "the token was refused",
+                        step="prove the line",
+                        value=refused.value,
+                        limit="the token back",
+                        remedy=f"{refused.remedy}; or a late refusal or a second master: the line is brought back into step",
+                    ) from refused
+            self._stats.waits += 1
+            self._fall_silent()
 
     def _resynchronise(self) -> None:
         """Silence, drain, token; again while old answers keep coming. Leaves the line watched."""

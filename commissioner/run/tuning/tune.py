@@ -13,10 +13,11 @@ from typing import Any
 from typing_extensions import TypedDict
 
 from commissioner.encoding import plain
-from commissioner.errors import Aborted, CheckFailed, CommissionerError, DriveFault, LinkError, UsageError
+from commissioner.errors import Aborted, CheckFailed, CommissionerError, DataRefused, DriveFault, LinkError, UsageError
 from commissioner.link.drive.facts import Intent
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.drive.ordinary.tuning import REST, Operator, Tuned
+from commissioner.link.drive.write_back import check_can_be_given_back
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate
@@ -26,6 +27,7 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Findings
 from commissioner.procedure.tuned import TunedRow, TuneVerdict, judge_tunings
 from commissioner.records import ParameterSnapshot
+from commissioner.registers.convention import as_in_drive
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
 from commissioner.report.run.summary import summarise
@@ -36,6 +38,7 @@ from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import names_of, open_drive
+from commissioner.run.proof import check_plausible
 from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
 from commissioner.run.stopping.stop_file import stopped_by_file
 from commissioner.run.tuning.earlier import earlier_values
@@ -246,8 +249,20 @@ class _Run:
         _check_watchdog(inverter, self._wanted)
         common.snapshot = inverter.snapshot()
         self._folder.save("snapshot.json", common.snapshot)
+        if self._can_write:
+            check_can_be_given_back(common.snapshot)
+            self._note_what_restore_refuses(common.snapshot)
         self._folder.journal("tuning_began", {"form": self._wanted.tuning.form}, durable=True)
         return common.snapshot
+
+    def _note_what_restore_refuses(self, snapshot: ParameterSnapshot) -> None:
+        """A drive that was never set up holds what no motor has: it gets it back within this tune, and never from an archive."""
+        try:
+            check_plausible(self._folder.path, self._profile, snapshot)
+        except DataRefused as refused:
+            self._found.remarks.append(
+                f"before this tuning the drive held {refused.value}, which no motor of this plate has: `restore` will refuse it; {refused.remedy}"
+            )
 
     def _repeat(self, inverter: Inverter) -> None:
         tuner = inverter.tuner(self._wanted.tuning, self._operator)
@@ -289,7 +304,9 @@ class _Run:
         repeats = [done.values for done in self._found.repeats]
         before = {**snapshot.in_use, **{n: v for n, v in snapshot.plate.items() if n in repeats[0]}}
         first = {name: before.get(name, repeats[0][name]) for name in repeats[0]}
-        self._found.verdict = judge_tunings(self._profile, repeats, first, self._plate, self._earlier)
+        self._found.verdict = judge_tunings(
+            self._profile, repeats, first, as_in_drive(self._plate, snapshot.plate), self._earlier
+        )
         self._folder.journal("tunings_judged", self._found.verdict, durable=True)
         self._tell(self._found.verdict)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from commissioner.errors import CheckFailed
+from commissioner.errors import CheckFailed, IdentityMismatch
 from commissioner.link.files.drive_file import load_profile
 from commissioner.run import restore as restoring
 from commissioner.run.archive.catalogue import find_run
@@ -45,6 +45,24 @@ def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monke
         monkeypatch.setattr(restoring, "open_port", lambda *_, d=tried.drive, c=clock, **__: bench.VendorPort(d, c))
         restoring.restore(find_run(tmp_path / Path(name).stem, "last"), None)
         assert tried.drive.truth()["held"] == tried.before, name
+
+
+@pytest.mark.parametrize("how", ["good", "fails"])
+def test_a_tune_is_not_taken_back_from_a_drive_that_holds_what_it_neither_found_nor_left(how, tmp_path, monkeypatch):
+    """No register tells two drives of a type apart, their values do; after a tuning that failed nobody knows what it left."""
+    tried = bench.try_tune("schneider_atv340", tmp_path, habits=Habits(tunings=(how,)))
+    other = tried.drive
+    cell = other.face.cells["stator_resistance"]
+    other.words[cell.address] += 7
+    monkeypatch.setattr(restoring, "open_port", lambda *_, c=tried.person.clock, **__: bench.VendorPort(other, c))
+    if how == "fails":
+        restoring.restore(find_run(tmp_path, "last"), None)
+        assert other.truth()["held"] == tried.before
+        return
+    with pytest.raises(IdentityMismatch, match="neither found nor wrote") as refused:
+        restoring.restore(find_run(tmp_path, "last"), None)
+    assert "another drive of its type" in refused.value.remedy
+    assert other.truth()["held"]["stator_resistance"] == tried.truth["held"]["stator_resistance"] + 7
 
 
 def test_a_remote_tune_without_a_known_watchdog_wants_a_hard_wired_stop(tmp_path):

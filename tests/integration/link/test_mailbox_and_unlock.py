@@ -86,6 +86,18 @@ def test_a_circuit_that_the_drive_computed_anew_after_a_new_plate_is_not_written
     assert drive.truth["held"]["stator_resistance"] == pytest.approx(7.4, rel=1e-4)
 
 
+def test_a_refusal_of_the_drives_own_meaning_is_not_answered_by_the_protocols_remedy():
+    """Its exception 5 is a wrong password, and not a job that will end."""
+    with Vendor(LOCKED) as drive, closing(open_port(parse_url(drive.url), load_profile(LOCKED))) as port:
+        with pytest.raises(RequestRefused) as refused:
+            port._refused("write register 1", 5, is_read=False)
+        assert refused.value.remedy == "the drive says: the password is wrong"
+        with pytest.raises(RequestRefused) as refused:
+            port.write(9642, [1, 2])
+    assert refused.value.value == 4
+    assert "unlocked and under bus control" in refused.value.remedy
+
+
 class Recorded:
     """A port that keeps what was written; after `fails_after` writes each one is refused."""
 

@@ -238,6 +238,32 @@ def test_a_profile_without_echo_register_proves_the_line_by_answers_of_two_lengt
         port.close()
 
 
+@pytest.mark.parametrize("has_echo", [True, False])
+def test_a_drive_that_is_busy_after_each_write_is_waited_out_where_the_line_is_proved(has_echo):
+    """Exception 6 in the token's place is no other answer: the line is proved once the drive answers again."""
+    busy = itertools.chain([True] * 3, itertools.repeat(False))
+    is_after_write = False
+
+    def script(request: bytes, answer: bytes) -> list[bytes]:
+        nonlocal is_after_write
+        if is_after_write and next(busy):
+            return [rtu_frame(bytes((request[0], request[1] | 0x80, 6)))]
+        is_after_write = is_after_write or request[2:4] == bytes((0, 200))
+        return [answer]
+
+    with RtuDevice(Bank()) as device:
+        device.script = script
+        profile = quick_profile(write_functions=(6,), has_read_write_multiple=False)
+        if not has_echo:
+            profile = dataclasses.replace(profile, items={n: i for n, i in profile.items.items() if n != "echo"})
+        port = open_port(RtuUrl(device.path, BAUD, parity="N"), profile, reply_timeout_s=1.0)
+        port.write(200, [7])
+        assert port.read(200, 1) == (7,)
+        assert port.stats.waits == 3
+        port.close()
+    assert [r[:3] for r in device.bank.requests].count(bytes((6, 0, 200))) == 1
+
+
 @pytest.mark.parametrize("asked", ["in doubt", "watched"])
 def test_an_adapter_pulled_out_while_the_line_is_drained_is_a_typed_error(asked, monkeypatch):
     def gone():

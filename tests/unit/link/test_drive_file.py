@@ -2,6 +2,7 @@
 
 import copy
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -14,9 +15,12 @@ from commissioner.link.files.drive_file import (
     load_profile,
     reference,
 )
+from commissioner.settings import read_toml
+from tests.support.vendor_process import MADE_UP
 
 SIMULATED = tomllib.loads((DRIVES_FOLDER / "simulated.toml").read_text("utf-8"))
 MISSING = object()
+LOCKED = MADE_UP[1]
 
 
 def changed(path, value):
@@ -58,6 +62,31 @@ def test_a_base_of_one_is_taken_off_every_address():
         "items": {"dc_link_v": {"address": 0x6001, "type": "u16", "access": "r", "source": "manual"}},
     }
     assert build(document, "x.toml").item("dc_link_v").address == 0x6000
+
+
+def test_a_base_of_one_is_taken_off_what_unlocks_enters_and_stores():
+    """What stands bare in the file is printed in the same manual: one register beside it is another parameter."""
+    document = read_toml(Path(LOCKED))
+    document["link"]["address_base"] = 1
+    document["items"]["stator_resistance"]["address"] += 1
+    document["parameters"]["enter"] = [[0x0911, 0]]
+    document["store"] = {"writes": [[8002, 1]], "done": [8002, 0], "coil": 65}
+    profile = build(document, "x.toml")
+    assert (profile.unlock.writes, profile.unlock.locks) == (((0x4000, 0x55AA),), ((0x4000, 0),))
+    assert profile.parameters.enter == ((0x0910, 0),)
+    assert (profile.store.writes, profile.store.done, profile.store.coil) == (((8001, 1),), (8001, 0), 64)
+
+
+@pytest.mark.parametrize("key", ["unlock.writes", "unlock.locks", "parameters.enter", "store.writes", "store.done"])
+def test_no_register_stands_before_the_first_one(key):
+    document = read_toml(Path(LOCKED))
+    document["link"]["address_base"] = 1
+    document["items"]["stator_resistance"]["address"] += 1
+    table, name = key.split(".")
+    document[table][name] = [0, 1] if name == "done" else [[0, 1]]
+    with pytest.raises(ConfigurationError, match="0 cannot be used") as refused:
+        build(document, "x.toml")
+    assert refused.value.key.startswith(key)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
 """Write-back and restore: old values or new values, verified, never a mixture that is not told."""
 
+import struct
+from dataclasses import replace
+
 import pytest
 
 from commissioner.errors import (
@@ -440,3 +443,52 @@ def test_a_commit_still_at_work_when_its_answer_is_lost_does_not_end_behind_our_
         drive.read(576, 8)
     assert len(reads) == 12
     assert bench.held() == pytest.approx(OLD, rel=1e-6)
+
+
+class Floats(Registers):
+    """Its file allows more than 1 ohm; it answers NaN after the first write of `spoils` values."""
+
+    def __init__(self, held, spoils=0):
+        super().__init__()
+        self.words[0x20], self.spoils = 0x0004, spoils
+        self.words[0x312:0x314] = struct.unpack(">2H", struct.pack(">f", held))
+
+    def write(self, address, values):
+        super().write(address, values)
+        if address == 0x312 and self.spoils:
+            self.spoils -= 1
+            self.words[0x312:0x314] = [0x7FC0, 0]
+
+
+def with_floats():
+    yaskawa = load_profile("yaskawa_a1000")
+    item = replace(yaskawa.item("stator_resistance"), type="f32", scale=1.0, minimum=1.0)
+    return replace(yaskawa, items={**yaskawa.items, item.name: item}, link=replace(yaskawa.link, max_write_registers=2))
+
+
+def test_a_drive_that_reads_back_no_number_gets_back_what_it_held():
+    drive = Floats(6.0, spoils=1)
+    inverter = Inverter(drive, with_floats(), sleep=lambda s: None)
+    with pytest.raises(WriteBackFailed, match=r"instead of 6\.5") as failed:
+        inverter.write_parameters({"stator_resistance": 6.5}, inverter.snapshot())
+    assert failed.value.was_restored
+    assert inverter.snapshot().in_use == {"stator_resistance": 6.0}
+
+
+def test_what_the_drive_held_outside_the_limits_of_its_file_is_given_back_and_a_new_value_is_not_taken():
+    drive = Floats(0.5)
+    inverter = Inverter(drive, with_floats(), sleep=lambda s: None)
+    found = inverter.snapshot()
+    inverter.write_parameters({"stator_resistance": 6.5}, found)
+    inverter.restore(found)
+    assert inverter.snapshot().in_use == {"stator_resistance": 0.5}
+    with pytest.raises(UsageError, match="cannot hold"):
+        inverter.write_parameters({"stator_resistance": 0.4}, found)
+
+
+def test_what_no_archive_can_bring_back_is_not_written_over():
+    drive = Floats(float("nan"))
+    inverter = Inverter(drive, with_floats(), sleep=lambda s: None)
+    with pytest.raises(CheckFailed, match="could not be given back"):
+        inverter.write_parameters({"stator_resistance": 6.5}, inverter.snapshot())
+    assert drive.log == []

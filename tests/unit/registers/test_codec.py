@@ -5,7 +5,7 @@ import math
 import pytest
 
 from commissioner.errors import ReplyMismatch, UsageError
-from commissioner.registers.codec import crc16_bytes, crc16_modbus, decode_item, decode_span, encode_item
+from commissioner.registers.codec import crc16_bytes, crc16_modbus, decode_item, decode_span, encode_item, held_words
 from commissioner.registers.profile import Item, Span, plan_spans
 
 
@@ -103,3 +103,19 @@ def test_a_request_never_exceeds_the_drives_limit():
 def test_a_span_decodes_each_item_from_its_own_words():
     span = Span(10, 3, (Item("a", 10, "u16"), Item("b", 11, "u32")))
     assert decode_span(span, (7, 1, 2)) == {"a": 7, "b": 65538}
+
+
+@pytest.mark.parametrize(
+    ("description", "words"),
+    [
+        (item("u16", minimum=1.0), (0,)),
+        (item("i16", scale=0.01, maximum=5.0), (0x7FFF,)),
+        (item("f32"), (0x7FC0, 0)),
+        (item("f32", word_order="little"), (0, 0x7F80)),
+    ],
+)
+def test_what_a_drive_held_is_compared_and_given_back_whatever_new_values_may_be(description, words):
+    value = decode_item(description, words)
+    assert held_words(description, value) == words
+    with pytest.raises(UsageError):
+        encode_item(description, value)

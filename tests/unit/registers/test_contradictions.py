@@ -50,6 +50,15 @@ def changed(name, *changes):
         ("simulated", "items.rated_power_w.scale", 1e10, "items.rated_power_w.scale", "1e-09 ... 1e+09"),
         ("simulated", "items.rated_power_w.scale", 9e-10, "items.rated_power_w.scale", "1e-09 ... 1e+09"),
         ("yaskawa_a1000", "parameters.order", ["stator_resistance"] * 2, "parameters.order[1]", "parameters.order[0]"),
+        ("yaskawa_a1000", "items.status_word.scale", 0.1, "items.status_word.scale", "read by its bits"),
+        ("yaskawa_a1000", "items.fault_code.type", "f32", "items.fault_code.type", "a whole number's type"),
+        ("yaskawa_a1000", "items.dc_link_v.type", "ascii", "items.dc_link_v.type", "a number's type"),
+        ("danfoss_fc302", "items.rated_voltage_v.length", 2, "items.rated_voltage_v.length", "one number"),
+        ("yaskawa_a1000", "items.status_word.access", "w", "items.status_word.access", "it is read"),
+        ("yaskawa_a1000", "items.stator_resistance.access", "r", "parameters.order[0]", "can be written"),
+        ("yaskawa_a1000", "parameters.enter", [[0x0312, 0]], "parameters.enter", "items.stator_resistance stands there"),
+        ("danfoss_fc302", "store.writes", [[1300, 1]], "store.writes", "items.stator_resistance stands there"),
+        ("yaskawa_a1000", "items.stator_resistance.convention", "percent_of_base_impedance", "items.stator_resistance.unit", "'%'"),
         ("yaskawa_a1000", "unknown.power_faktor", "not seen", "unknown.power_faktor", "perhaps power_factor"),
     ],
 )  # fmt: skip
@@ -113,3 +122,17 @@ def test_a_heartbeat_is_written_only_where_the_drive_is_to_be_energised():
     with pytest.raises(ConfigurationError) as caught:
         build(document, "x.toml")
     assert caught.value.key == "items.beat.access"
+
+
+def test_what_is_written_in_per_cent_needs_the_drives_own_rated_values():
+    """Where they are not read, nobody sees that the drive counts from another motor's."""
+    percent = [
+        ("items.stator_resistance.convention", "percent_of_base_impedance"), ("items.stator_resistance.unit", "%"),
+        ("worked", [{
+            "item": "stator_resistance", "words": [3334], "value": 3.334, "per_phase": 1.5399393, "source": "computed",
+            "rated_voltage_v": 400.0, "rated_current_a": 5.0,
+        }]),
+    ]  # fmt: skip
+    with pytest.raises(ConfigurationError, match="rated_voltage_v is missing") as caught:
+        build(changed("yaskawa_a1000", *percent), "some/drive.toml")
+    assert "means nothing without the drive's own" in str(caught.value.limit)

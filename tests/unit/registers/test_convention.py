@@ -5,11 +5,11 @@ import math
 
 import pytest
 
-from commissioner.errors import UsageError
+from commissioner.errors import CheckFailed, UsageError
 from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
-from commissioner.registers.convention import CONVENTIONS, drive_value, our_values
+from commissioner.registers.convention import CONVENTIONS, as_in_drive, drive_value, drive_values, our_values
 from commissioner.registers.profile import Item
 
 CIRCUIT = InverseGamma(3.2, 1.8, 0.026, 0.21)
@@ -114,3 +114,23 @@ def test_a_whole_circuit_is_read_back_whatever_its_stator_resistance_is_said_in(
             },
             rel=1e-12,
         )
+
+
+def test_per_cent_and_reactances_are_of_the_plate_in_the_drive():
+    held = {"rated_voltage_v": 415.0, "rated_current_a": 4.8, "rated_frequency_hz": math.nan, "pole_pairs": 2.0}
+    base = as_in_drive(PLATE, held)
+    assert (base.rated_voltage_v, base.rated_current_a, base.rated_frequency_hz) == (415.0, 4.8, 50.0)
+    percent = value("stator_resistance", "percent_of_base_impedance", plate=base)
+    assert percent == pytest.approx(100 * 3.2 / (415.0 / (math.sqrt(3) * 4.8)))
+
+
+@pytest.mark.parametrize(("scale", "fits"), [(0.001, True), (0.5, True), (10.0, False), (1.3, False)])
+def test_a_value_that_its_registers_steps_would_change_is_not_written(scale, fits):
+    item = Item("stator_resistance", 0, "u16", scale=scale, unit="ohm", convention="per_phase")
+    yaskawa = load_profile("yaskawa_a1000")
+    profile = dataclasses.replace(yaskawa, items={**yaskawa.items, item.name: item})
+    if fits:
+        assert drive_values(profile, CIRCUIT).values == {"stator_resistance": 3.2}
+        return
+    with pytest.raises(CheckFailed, match="counts in steps of"):
+        drive_values(profile, CIRCUIT)

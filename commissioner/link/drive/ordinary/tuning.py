@@ -6,6 +6,7 @@ it. Every look at the status is a request, by which a drive whose watchdog count
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -279,6 +280,11 @@ class Tuner:
                 raise DriveFault(
                     f"{name} still changes after the tuning", step="read the results", value=second[name], limit=value,
                     remedy="wait until the drive's display is at rest, then tune again",
+                )  # fmt: skip
+            if not math.isfinite(number(value)):
+                raise DriveFault(
+                    f"the drive gives no number as {name} after the tuning", step="read the results", value="not a number",
+                    limit="a number", remedy="see on the drive's display whether its tuning found it; check the item's type and word order",
                 )  # fmt: skip
         return {name: number(value) for name, value in second.items()}
 
