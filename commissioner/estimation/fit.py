@@ -254,12 +254,13 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
             indices = [columns[j].index for j in by_load]
             run[by_load] = _along_loads(problem, machine, k, max(indices) + 1)[indices]
         flown = np.clip(np.nan_to_num(run, copy=False), -FINITE, FINITE, out=run)
-        white = np.clip(problem.noise.white(flown), -LARGEST, LARGEST)
+        white = problem.noise.white(flown)
+        np.clip(white, -LARGEST, LARGEST, out=white)
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0
         parts.append(white.reshape(len(columns), -1))
-    return np.concatenate(parts, axis=1)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
 def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence[Column]) -> Array:
@@ -378,7 +379,7 @@ class _Sensitivity:
     Jacobian of an unknown load costs some hundred (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
 
     def __init__(self, jacobian: Array) -> None:
-        self.jacobian = jacobian
+        self.jacobian, self._is_own = jacobian, False
         self._gram = jacobian @ jacobian.T
 
     def step(self, rest: Array, columns: Sequence[Column], damping: float) -> Array:
@@ -405,7 +406,10 @@ class _Sensitivity:
         self._gram += (
             np.outer(weight, along) + np.outer(along, weight) + float(missed @ missed) * np.outer(weight, weight)
         )
-        self.jacobian = self.jacobian + np.outer(weight, missed)
+        if not self._is_own:
+            self.jacobian, self._is_own = self.jacobian.copy(), True
+        for j, share in enumerate(weight):  # an outer product would be as large as the Jacobian
+            self.jacobian[j] += share * missed
 
 
 def refine(

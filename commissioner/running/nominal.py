@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import (
-    CALM_S,
     Column,
     Fit,
     Machine,
@@ -50,8 +49,8 @@ ASSUMED_RUN_UP_S = 0.3
 ASSUMED_SHARES = (1.0, 0.3, 0.1)
 """Of a motor whose start was not recorded: from a load as heavy as ten of its own rotors to the bare shaft. Between two of these the valley of
 inertia and load is straight enough: from four times the true inertia 50 steps did not reach it, and L_sigma stayed 4 % low."""
-SHORT_S, NEAR = 1.0, 5.0
-"""First part of each window that decides between inertias; change of chi-square a sample below which a fit that another follows has ended."""
+NEAR = 5.0
+"""Change of chi-square a sample below which a fit that another follows has ended."""
 OPEN_INERTIA = 0.5
 """Standard deviation of the inertia, of itself, from which it is left as assumed."""
 WRONG_VALLEY = 300.0
@@ -220,31 +219,18 @@ def _with_inertia(problem: Problem, machine: Machine, columns: tuple[Column, ...
     Held at an assumed one, ten times the true, a healthy motor's R_R was 12 % off (six standard errors) and a leakage that saturates was
     named. Where the recording tells nothing of it, it draws nothing aside either.
     """
-    fit = refine(problem, _with_likeliest_inertia(problem.cut(SHORT_S), machine, columns), columns, tolerance=NEAR)
+    assumed = machine.value("inertia")
+    held = [refine(problem, machine.with_values({"inertia": share * assumed}), columns) for share in ASSUMED_SHARES]
+    fit = min(held, key=lambda f: f.chi2)
     inertia = Column("p", AT["inertia"])
     wide = replace(
         fit,
         columns=(*fit.columns, inertia),
         jacobian=np.concatenate([fit.jacobian, jacobian(problem, fit.machine, (inertia,))]),
     )
-    is_open = wide.std("inertia") > OPEN_INERTIA * fit.machine.value("inertia")
-    known = fit if is_open else wide
-    return refine(problem, fit.machine, known.columns, first_jacobian=known.jacobian)
-
-
-def _with_likeliest_inertia(part: Problem, machine: Machine, columns: Sequence[Column]) -> Machine:
-    """Fitted to the first part of the windows with several inertias held; its mean load goes on after that part."""
-    assumed, end = machine.value("inertia"), [w.time_s[-1] + CALM_S for w in part.record.windows]
-    own = [c for c in columns if c.kind != "k" or machine.knot_times_s[c.window, c.index] < end[c.window]]
-    held = [
-        refine(part, machine.with_values({"inertia": share * assumed}), own, tolerance=NEAR, is_final=False)
-        for share in ASSUMED_SHARES
-    ]
-    best = min(held, key=lambda f: f.chi2).machine
-    knots = best.knots.copy()
-    for row, times, last in zip(knots, best.knot_times_s, end, strict=True):
-        row[times >= last] = np.mean(row[times < last])
-    return replace(best, knots=knots)
+    if wide.std("inertia") > OPEN_INERTIA * fit.machine.value("inertia"):
+        return fit
+    return refine(problem, fit.machine, wide.columns, first_jacobian=wide.jacobian)
 
 
 def _run_up_s(record: Record) -> float:

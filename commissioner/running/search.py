@@ -209,7 +209,7 @@ def _found(seeking: Search) -> Found:
     gain, rivals = _judged(seeking, fit, accepted)
     return Found(
         seeking.problem,
-        unbiased(seeking.problem, seeking.base),
+        shown if fit is seeking.base else unbiased(seeking.problem, seeking.base),
         shown,
         accepted,
         gain,
