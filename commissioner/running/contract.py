@@ -19,7 +19,8 @@ if TYPE_CHECKING:
         NothingRecorded,
     )
 
-CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation; magnetizing inductance at no flux where saturation is named"
+CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation; magnetizing inductance and rotor time constant at the stated flux where saturation is named"
+OF_IRON = ("magnetizing_inductance_h", "rotor_time_constant_s")
 NEVER_NAMEABLE = (
     "common gain of the current sensors | common gain of the voltage sensors | all impedances",
     "delay | first-order lag of the current sensors",
@@ -50,7 +51,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
             "sigma_a": list(record.sigma_a),
         },
         "parameters_before": _quantities(seen.parameters_before),
-        "parameters_after": _quantities(seen.parameters_after),
+        "parameters_after": _quantities(seen.parameters_after, seen.stator_flux_wb),
         "below_materiality": [],
         "detection_limits": _limits(seen),
         "cannot_tell": list(NEVER_NAMEABLE) if found else [],
@@ -122,5 +123,9 @@ def _limits(seen: Diagnosis) -> dict[str, Limit | dict[str, Limit]]:
     return out
 
 
-def _quantities(values: Mapping[str, Quantity]) -> dict[str, Measured]:
-    return {name: {"value": q.value, "std": q.std} for name, q in values.items()}
+def _quantities(values: Mapping[str, Quantity], flux_wb: float | None = None) -> dict[str, Measured]:
+    """`flux_wb`: peak stator flux at which `OF_IRON` hold, where that is not one value for all."""
+    out: dict[str, Measured] = {name: {"value": q.value, "std": q.std} for name, q in values.items()}
+    for name in OF_IRON if flux_wb is not None else ():
+        out[name]["at_stator_flux_wb"] = flux_wb
+    return out

@@ -15,6 +15,7 @@ from commissioner.estimation.record import Record, prepare
 from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DiagnosisVerdict, RunningRecording
+from commissioner.running.at_flux import at_flux, is_saturated, stator_flux_wb
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.lack import Lack, lack_of_fit, not_told, rms_errors
@@ -62,7 +63,8 @@ class Gain:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything the report shows. `found` is None where the data were refused, or the time was over before four numbers were fitted."""
+    """Everything the report shows. `found` is None where the data were refused, or the time was over before four numbers were fitted.
+    `stator_flux_wb`: where the iron saturates, the peak flux at which L_M and T_R of `parameters_after` hold."""
 
     verdict: DiagnosisVerdict
     reason: str
@@ -76,6 +78,7 @@ class Diagnosis:
     record: Record | None = None
     remarks: tuple[str, ...] = ()
     refusal: DataRefused | None = None
+    stator_flux_wb: float | None = None
 
     def numbers(self) -> dict[str, float]:
         """Of the final machine, by name; empty where the data were refused."""
@@ -145,10 +148,13 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         remarks.append(
             "No speed column: the speed is that of a shaft with the fitted load, nothing is held out; iron loss and heating of the rotor are hard to see."
         )
+    saturated: Mapping[str, Quantity] = {}
+    if is_saturated(found.fit.machine.values()):
+        saturated = _with_errors(found.fit, lambda values: at_flux(record, values))
     return Diagnosis(
-        verdict, reason, causes, gain, left, _parameters(found.nominal), _parameters(found.fit),
+        verdict, reason, causes, gain, left, _parameters(found.nominal), {**_parameters(found.fit), **saturated},
         next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record) if found.is_complete else None,
-        found, record, tuple(remarks),
+        found, record, tuple(remarks), stator_flux_wb=abs(stator_flux_wb(record, found.fit.machine.values())) if saturated else None,
     )  # fmt: skip
 
 
@@ -191,21 +197,28 @@ def _cause(found: Found, one: Named) -> NamedCause:
 
 def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
     """With standard deviations from the covariance of all that was free."""
-    machine, scales, cause = found.fit.machine, found.problem.record.scales, CATALOGUE[one.cause]
-    values = dict(zip(NAMES, machine.physical(), strict=True))
-    own = {n: j for j, c in enumerate(found.fit.columns) if c.kind == "p" for n in [NAMES[c.index]]}
-    covariance, slope = found.fit.covariance(), machine.slope()
-    sizes = cause.sizes(values, scales)
-    gradient = {name: np.zeros(len(found.fit.columns)) for name in sizes}
-    for number, j in own.items():
+    scales, cause = found.problem.record.scales, CATALOGUE[one.cause]
+    units = {name: unit for name, (_, unit) in cause.sizes(found.fit.machine.values(), scales).items()}
+    told = _with_errors(
+        found.fit, lambda values: {name: size for name, (size, _) in cause.sizes(values, scales).items()}
+    )
+    return {name: (q.value, q.std, units[name]) for name, q in told.items()}
+
+
+def _with_errors(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, Quantity]:
+    """What is made of the machine's numbers, with standard deviations from the covariance of all that was free."""
+    values, slope, covariance = fit.machine.values(), fit.machine.slope(), fit.covariance()
+    known = made(values)
+    gradient = {name: np.zeros(len(fit.columns)) for name in known}
+    for j, number in ((j, NAMES[c.index]) for j, c in enumerate(fit.columns) if c.kind == "p"):
         h = 1e-5 * max(abs(values[number]), 1e-4)
         for sign in (1.0, -1.0):
-            moved = cause.sizes({**values, number: values[number] + sign * h}, scales)
-            for name in sizes:
-                gradient[name][j] += sign * moved.get(name, sizes[name])[0] / (2.0 * h) * slope[AT[number]]
+            moved = made({**values, number: values[number] + sign * h})
+            for name in known:
+                gradient[name][j] += sign * moved.get(name, known[name]) / (2.0 * h) * slope[AT[number]]
     return {
-        name: (float(value), float(np.sqrt(max(float(gradient[name] @ covariance @ gradient[name]), 0.0))), unit)
-        for name, (value, unit) in sizes.items()
+        name: Quantity(float(x), float(np.sqrt(max(float(gradient[name] @ covariance @ gradient[name]), 0.0))))
+        for name, x in known.items()
     }
 
 

@@ -49,6 +49,8 @@ ASSUMED_RUN_UP_S = 0.3
 ASSUMED_SHARES = (1.0, 0.3, 0.1)
 """Of a motor whose start was not recorded: from a load as heavy as ten of its own rotors to the bare shaft. Between two of these the valley of
 inertia and load is straight enough: from four times the true inertia 50 steps did not reach it, and L_sigma stayed 4 % low."""
+NEAR = 5.0
+"""Change of chi-square a sample below which a fit that another follows has ended."""
 OPEN_INERTIA = 0.5
 """Standard deviation of the inertia, of itself, from which it is left as assumed."""
 WRONG_VALLEY = 300.0
@@ -200,6 +202,15 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
     if record.has_start or record.plate.inertia_kg_m2:
         return refine(problem, machine, columns)
     return _with_inertia(problem, machine, columns)
+
+
+def held_at_plate(problem: Problem, fit: Fit, names: Sequence[str]) -> Fit:
+    """All else fitted with these of the four held at what the plate tells of them."""
+    plate = dict(zip(FOUR, prior(problem.record.plate).typical.as_tuple(), strict=True))
+    machine = fit.machine.with_values({name: plate[name] for name in names})
+    fixed = {AT[name] for name in names}
+    others = [c for c in fit.columns if c.kind != "p" or c.index not in fixed]
+    return refine(problem, machine, others, tolerance=NEAR)
 
 
 def _with_inertia(problem: Problem, machine: Machine, columns: tuple[Column, ...]) -> Fit:

@@ -97,3 +97,15 @@ def test_a_shift_by_noise_that_leaves_more_than_noise_is_not_taken(monkeypatch: 
     shifted = unbiased(problem, fit)
     rest = fitted_part(problem, residuals(problem, shifted.machine))
     assert rest @ rest < 1.05 * fit.chi2
+
+
+def test_a_broken_bar_under_one_steady_load_is_named() -> None:
+    """Nothing but noise told R_R: the fit made it explain the side bands, far off, where no cause gained, and the bar was unexplained."""
+    size = 0.06
+    broken = _running(
+        5000, inertia=0.03, load_constant=0.7, unbalance=0.02, voltage_noise_v=1.0, cage_asymmetry_re=size
+    )
+    found = diagnose([broken], PLATE)
+    assert [c.name for c in found.causes] == ["rotor_asymmetry"]
+    assert found.causes[0].sizes["relative_asymmetry"][0] == pytest.approx(size, rel=0.02)
+    assert found.parameters_after["rotor_resistance_ohm"].value == pytest.approx(FOUR["rotor_resistance"], rel=0.02)

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from commissioner.estimation.fit import Column, Fit, Machine
+from commissioner.estimation.numbers import AT
+from commissioner.estimation.numbers import COUNT as NUMBERS
 from commissioner.estimation.told import inverse, told
 
 RNG = np.random.default_rng(3)
@@ -46,3 +49,17 @@ def test_without_noise_it_is_the_inverse() -> None:
     _, gram = _fitted(0.35, RNG)
     assert told(gram, 0.0).covariance == pytest.approx(np.linalg.inv(gram), rel=1e-6)
     assert told(gram, 1e-9 * gram).covariance == pytest.approx(np.linalg.inv(gram), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("along", "opened"), [((1.0, -1.0, 0.05), {"stator_resistance", "rotor_resistance"}), ((0.02, -0.01, 1.0), set())]
+)
+def test_a_long_recording_does_not_tell_what_only_its_noise_does(along: tuple[float, ...], opened: set[str]) -> None:
+    """Deviations of half a per cent along a direction that noise makes: open where the four move along it, not where the inertia does."""
+    columns = tuple(Column("p", AT[n]) for n in ("stator_resistance", "rotor_resistance", "inertia"))
+    turned, _ = np.linalg.qr(np.column_stack([along, np.eye(3)[:, :2]]))
+    jacobian = turned @ np.diag([200.0, 1e3, 1e3])
+    by_noise = 0.6 * np.outer(turned[:, 0], turned[:, 0]) * 200.0**2
+    machine = Machine(np.zeros(NUMBERS), np.zeros((1, 10)), np.zeros((1, 2)), np.zeros((1, 2)))
+    fit = Fit(machine, columns, 3.0, np.ones(3), jacobian, 0.0, 0, by_noise)
+    assert set(fit.not_told()) == opened
