@@ -63,12 +63,12 @@ def are_three_tests(tables: Sequence[Mapping[str, Array]]) -> bool:
     if any(lacking(t, LEAST_COLUMNS) for t in tables):
         return False
     every = [pooled(t) for t in tables]
-    of_direct = [bool(np.all(of_direct_current(rows))) for rows in every]
-    if all(of_direct):
+    alternating = [rows for rows in every if not are_of_direct_current(rows)]
+    if not alternating:
         return True
-    ac = joined([rows for rows, is_direct in zip(every, of_direct, strict=True) if not is_direct])
-    few = any(rows.frequency_hz.size < LEAST_POINTS for rows, is_dc in zip(every, of_direct, strict=True) if not is_dc)
-    return few and (any(of_direct) or _are_named(ac) or (ac.frequency_hz.size > 1 and looks_idle(ac) is not None))
+    ac, has_direct = joined(alternating), len(alternating) < len(every)
+    few = any(rows.frequency_hz.size < LEAST_POINTS for rows in alternating)
+    return few and (has_direct or _are_named(ac) or looks_idle(ac) is not None)
 
 
 def apart(table: Mapping[str, Array]) -> list[tuple[float, NDArray[np.bool_]]]:
@@ -125,6 +125,10 @@ def joined(every: Sequence[Rows]) -> Rows:
 def of_direct_current(rows: Rows) -> NDArray[np.bool_]:
     """A row without frequency is of direct current, unless it is called otherwise."""
     return np.asarray(is_direct(rows.frequency_hz, rows.said) & (rows.voltage_v > 0.0) & (rows.current_a > 0.0))
+
+
+def are_of_direct_current(rows: Rows) -> bool:
+    return bool(np.all(of_direct_current(rows)))
 
 
 def looks_idle(ac: Rows) -> NDArray[np.bool_] | None:

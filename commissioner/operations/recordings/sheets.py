@@ -104,23 +104,20 @@ def _named(test: float, size: int) -> dict[str, Any]:
 def direct_current(tables: Sequence[Table], motor: str | None) -> tuple[list[Table], float | None, tuple[str, ...]]:
     """The tables (`by_test`) of alternating current, the resistance that those of direct current tell (None: there are none), and how it
     was taken. DataRefused: a row is called by another test's name, or the direct current is ambiguous."""
-    from commissioner.diagnose.points.rows import joined, misnamed, of_direct_current, pooled
+    from commissioner.diagnose.points.rows import are_of_direct_current, joined, misnamed, pooled
     from commissioner.diagnose.points.three_tests import stator_resistance
 
     if any(c not in t.columns for t in tables for c in LEAST_COLUMNS):
         return list(tables), None, ()
     if (wrong := misnamed([t.columns for t in tables])) is not None:
         raise wrong
-    of_direct = [bool(np.all(of_direct_current(pooled(t.columns)))) for t in tables]
-    if not any(of_direct):
-        return list(tables), None, ()
-    direct, rest = (
-        [t for t, is_dc in zip(tables, of_direct, strict=True) if is_dc is wanted] for wanted in (True, False)
-    )
+    direct = [t for t in tables if are_of_direct_current(pooled(t.columns))]
+    rest = [t for t in tables if not are_of_direct_current(pooled(t.columns))]
+    if not direct:
+        return rest, None, ()
     said = {**{k: v for t in reversed(tables) for k, v in t.metadata.items()}, **plate_metadata(motor)}
-    found = stator_resistance(
-        joined([pooled(t.columns) for t in direct]), [], said, joined([pooled(t.columns) for t in rest])
-    )
+    of_direct, of_rest = (joined([pooled(t.columns) for t in some]) for some in (direct, rest))
+    found = stator_resistance(of_direct, [], said, of_rest)
     if isinstance(found, DataRefused):
         raise found
     return rest, found[0], (found[1],)
