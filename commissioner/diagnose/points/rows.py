@@ -47,6 +47,10 @@ class Rows:
         return np.asarray(self.voltage_v / np.sqrt(3.0) / self.current_a)
 
     @property
+    def power_factor(self) -> Array:
+        return np.asarray(self.resistance_ohm / self.impedance_ohm)
+
+    @property
     def reactance_ohm(self) -> Array:
         return np.asarray(np.sqrt(np.maximum(self.impedance_ohm**2 - self.resistance_ohm**2, 0.0)))
 
@@ -81,7 +85,7 @@ def apart(table: Mapping[str, Array]) -> list[tuple[float, NDArray[np.bool_]]]:
     idle = np.isfinite(ac.said) & (ac.said == IDLE_TEST) if _are_named(ac) else _lies_apart(ac)
     if idle is not None:
         named = np.isfinite(ac.said) if _are_named(ac) else np.ones(idle.size, dtype=bool)
-        loaded = idle & (ac.resistance_ohm > IDLE_POWER_FACTOR * ac.impedance_ohm)
+        loaded = idle & (ac.power_factor > IDLE_POWER_FACTOR)
         tests[~direct] = np.where(named & ~loaded, np.where(idle, IDLE_TEST, LOCKED_TEST), np.nan)
     tests[direct] = DIRECT_TEST
     found = [(test, tests == test) for test in (DIRECT_TEST, IDLE_TEST, LOCKED_TEST) if np.any(tests == test)]

@@ -147,7 +147,7 @@ def _wrong_cell(ac: Rows) -> DataRefused | None:
                 f"{name} is {values[wrong[0]]:g} in point {wrong[0] + 1} of the alternating-current tests",
                 float(values[wrong[0]]), "positive numbers in every row", "correct the cell or leave the row out",
             )  # fmt: skip
-    factor = ac.resistance_ohm / ac.impedance_ohm
+    factor = ac.power_factor
     if factor.size and factor.max() > 1.0:
         k = int(np.argmax(factor))
         return refused(
@@ -167,9 +167,7 @@ def _by_kind(ac: Rows) -> tuple[Rows, Rows, tuple[str, ...]]:
             is_idle = np.zeros(is_idle.size, dtype=bool)
     named = ac.said == LOCKED_TEST
     most = UNLIKE * float(ac.inductance_h[named].max(initial=0.0)) or np.inf
-    loaded = np.where(
-        is_idle, ac.resistance_ohm > IDLE_POWER_FACTOR * ac.impedance_ohm, np.isnan(ac.said) & (ac.inductance_h > most)
-    )
+    loaded = np.where(is_idle, ac.power_factor > IDLE_POWER_FACTOR, np.isnan(ac.said) & (ac.inductance_h > most))
     said = (f"{int(loaded.sum())} points of a loaded motor were not used.",) if loaded.any() else ()
     return ac.at(is_idle & ~loaded), ac.at(~is_idle & ~loaded), said
 
