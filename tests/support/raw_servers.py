@@ -18,8 +18,12 @@ import time
 import tty
 from collections.abc import Callable, Sequence
 from types import TracebackType
+from typing import TypeVar
 
+from commissioner.errors import LinkError
 from tests.support.scripted_port import crc16
+
+Opened = TypeVar("Opened")
 
 Piece = bytes | float
 Script = Callable[[bytes, bytes], Sequence[Piece]]
@@ -163,6 +167,18 @@ class TcpDevice(_Device):
 
     def _close(self) -> None:
         self._listener.close()
+
+
+def once_free(connect: Callable[[], Opened], within_s: float = 5.0) -> Opened:
+    """What `connect` opens. A pty's number comes back at once: a client of the device before may still be trying for its line."""
+    end = time.monotonic() + within_s
+    while True:
+        try:
+            return connect()
+        except LinkError as error:
+            if "another program holds" not in str(error) or time.monotonic() > end:
+                raise
+            time.sleep(0.05)
 
 
 class RtuDevice(_Device):

@@ -15,7 +15,7 @@ from commissioner.link.wire.url import RtuUrl
 from sim.scenario import load
 from sim.wire.server import run_in_thread
 from sim.wire.station import Options
-from tests.support.raw_servers import Bank, RtuDevice, rtu_frame
+from tests.support.raw_servers import Bank, RtuDevice, once_free, rtu_frame
 
 BAUD = 921600
 TIMEOUT_S = 0.1
@@ -56,7 +56,7 @@ def opened(device, clock=time.monotonic, **link):
         RtuUrl(device.path, BAUD, parity="N"), profile, reply_timeout_s=TIMEOUT_S, connect_timeout_s=1.0, clock=clock
     )
     port.read_retries = 0
-    port.connect()
+    once_free(port.connect)
     return port
 
 

@@ -11,7 +11,7 @@ from commissioner.errors import LinkError, ReplyMismatch, ReplyTimeout, RequestR
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.url import RtuUrl
-from tests.support.raw_servers import Bank, RtuDevice, rtu_frame
+from tests.support.raw_servers import Bank, RtuDevice, once_free, rtu_frame
 
 BAUD = 921600
 TIMEOUT_S = 0.1
@@ -22,8 +22,9 @@ def quick_profile(**changes):
     return dataclasses.replace(profile, link=dataclasses.replace(profile.link, turnaround_s=0.002, **changes))
 
 
-def connect(device: RtuDevice, **changes) -> ModbusPort:
-    return open_port(RtuUrl(device.path, BAUD, parity="N"), quick_profile(**changes), reply_timeout_s=TIMEOUT_S)
+def connect(device: RtuDevice, profile=None, timeout_s: float = TIMEOUT_S, **changes) -> ModbusPort:
+    profile = profile or quick_profile(**changes)
+    return once_free(lambda: open_port(RtuUrl(device.path, BAUD, parity="N"), profile, reply_timeout_s=timeout_s))
 
 
 class Late:
@@ -229,7 +230,7 @@ def test_a_profile_without_echo_register_proves_the_line_by_answers_of_two_lengt
         commercial, items=items, link=dataclasses.replace(commercial.link, turnaround_s=0.002)
     )
     with RtuDevice(Bank()) as device:
-        port = open_port(RtuUrl(device.path, BAUD, parity="N"), profile, reply_timeout_s=TIMEOUT_S)
+        port = connect(device, profile)
         port.read(10, 4)
         device.script = Shifted(nth=1)
         for address in (100, 200):
@@ -256,7 +257,7 @@ def test_a_drive_that_is_busy_after_each_write_is_waited_out_where_the_line_is_p
         profile = quick_profile(write_functions=(6,), has_read_write_multiple=False)
         if not has_echo:
             profile = dataclasses.replace(profile, items={n: i for n, i in profile.items.items() if n != "echo"})
-        port = open_port(RtuUrl(device.path, BAUD, parity="N"), profile, reply_timeout_s=1.0)
+        port = connect(device, profile, 1.0)
         port.write(200, [7])
         assert port.read(200, 1) == (7,)
         assert port.stats.waits == 3
