@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from commissioner.recordings.units import IN_NAME, is_temperature, read_unit, unbracketed, unit_in, without_brackets
-from commissioner.recordings.words import folded, translated
+from commissioner.recordings.words import MOST_KEPT, folded, translated
 
 PHASES = {
     "a": "u",
@@ -168,6 +169,7 @@ _COMPONENT = re.compile(rf"({CURRENT}|{VOLTAGE})s?(alpha|beta)(?:ref|soll|set|cm
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
+@lru_cache(MOST_KEPT)
 def meaning_of(name: str, with_s: bool = False) -> str | None:
     """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
     if CONTRACT.fullmatch(name):
@@ -285,6 +287,7 @@ def _lettered(name: str) -> str:
     return f"{found[1]}_{found[2][int(found[3])]}{found[4]}" if found else name
 
 
+@lru_cache(MOST_KEPT)
 def key_of(name: str) -> str:
     """Letters and digits of a name, without accents, its unit in brackets and its path."""
     bare = without_brackets(_without_path(name))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Set
+from functools import lru_cache
 
 from commissioner.recordings.names import ALPHABETS, PHASES, is_remark, key_of, meanings_of
 from commissioner.recordings.units import IN_NAME, unit_in
-from commissioner.recordings.words import readings, translated
+from commissioner.recordings.words import MOST_KEPT, readings, translated
 from commissioner.records import WATT_METERS, WINDINGS
 
 _VOLTS = r"(?:v|u|e|voltage|volts?|spannung|tension)"
@@ -83,6 +84,7 @@ _NUMBERED_VOLTS = re.compile(rf"(?:{_VOLTS}|voltmeter)l?[123]")
 """A meter's number or a phase's, between lines or to the neutral: not said."""
 
 
+@lru_cache(MOST_KEPT)
 def sheet_meaning(name: str) -> str | None:
     """The column of a test sheet (`Voltage (V)`, `I_line [A]`, `P_in/kW`) that a name means, or None."""
     if name in SHEET:
@@ -132,6 +134,7 @@ def winding_columns(names: Iterable[str]) -> dict[str, str]:
     )
 
 
+@lru_cache(MOST_KEPT)
 def resistance_meaning(name: str, with_s: bool = False) -> str | None:
     """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None. `with_s`: behind
     words `RS` is between the terminals R and S, for another pair stands beside it; else it is the stator's symbol, which tells no more than

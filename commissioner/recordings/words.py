@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 MOST_KEPT = 4096
-"""Names whose translation is kept: a table's head is read in many ways."""
+"""Names of which is kept what they mean: a table's head is read in many ways."""
 
 TRANSLATED = {
     "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
@@ -95,6 +95,7 @@ TRANSLATED = {
 """What only joins names is a space. With their accents, which name the code page of a text; looked for with or without them."""
 
 
+@lru_cache(MOST_KEPT)
 def folded(text: str) -> str:
     """The text without marks above and below its letters: `Fréquence` as `Frequence`, `akım` as `akim`, `außen` as `aussen`."""
     return (
