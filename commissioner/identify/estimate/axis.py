@@ -36,7 +36,7 @@ POORER = 1.1
 """Of the earlier axis' residual: what a fit that begins like it may leave before the axis is also fitted as if it were the first. The
 model chosen for a small flux, bent as far as a larger one goes, left 1.36 of the noise."""
 ASLANT_SHARE = 0.5
-"""Of the current beside an aslant axis, relative to the one along it: the worst value of five motors was off by that much."""
+"""Of the current beside an aslant axis, relative to the one along it: the worst value of five motors was off by 1.5 times that."""
 LARGEST_DISAGREEMENT = 3.0
 """Joint standard errors between observer and batch fit beyond which the observer is not believed."""
 
