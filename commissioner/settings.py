@@ -12,8 +12,9 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from commissioner.encoding import JsonObject
-from commissioner.errors import ConfigurationError
+from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import Nameplate, check, connection_of
+from commissioner.motor.space_vector import LEGS_ALIKE_DEG, is_aslant
 from commissioner.paths import no_file, no_such_name
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.validation import FileTable, first_problem
@@ -138,15 +139,35 @@ def load_procedure(
     path: Path | None = None, axes_deg: tuple[float, ...] | None = None, *, strict: bool = False
 ) -> ProcedurePlan:
     """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes, `strict` its
-    leniency."""
+    leniency. UsageError: no run can be made of it."""
     source = path or CONFIG_FOLDER / "procedure.toml"
     planned = plan_of(read_toml(source), str(source))
     acceptance = replace(planned.acceptance, strict=strict or planned.acceptance.strict)
-    return replace(planned, axes_deg=axes_deg or planned.axes_deg, acceptance=acceptance)
+    plan = replace(planned, axes_deg=axes_deg or planned.axes_deg, acceptance=acceptance)
+    require_possible(plan, str(source))
+    return plan
+
+
+def require_possible(plan: ProcedurePlan, source: str) -> None:
+    """UsageError: an axis on which nothing can be measured truly, or less time than the tests take; told before anything is energised."""
+    for axis_deg in filter(is_aslant, plan.axes_deg):
+        raise UsageError(
+            f"axis {axis_deg:g} deg cannot be tested",
+            step="read configuration",
+            value=f"{axis_deg:g} deg",
+            limit=f"multiples of {LEGS_ALIKE_DEG:g} deg: beside them the losses of the inverter's legs drive a current across the axis, "
+            "and all values are off",
+            remedy="test axes such as 0, 60 and 120 deg",
+        )
+    if plan.limits.total_time_s < plan.total_seconds:
+        raise ConfigurationError(
+            file=source, key="limits.total_time_s", value=plan.limits.total_time_s,
+            expected=f"at least {plan.total_seconds:.0f} s, which {len(plan.tests_deg)} axis tests take",
+        )  # fmt: skip
 
 
 def plan_of(document: JsonObject, source: str) -> ProcedurePlan:
-    """The plan that a procedure file's document makes."""
+    """The plan that a procedure file's document makes, also one that an earlier run was made of and that is refused today."""
     model = _checked(document, ProcedureFile, source)
     must_agree(model, source)
     return ProcedurePlan(

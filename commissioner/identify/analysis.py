@@ -55,6 +55,7 @@ from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, RatedFlux, prior, rated_flux
+from commissioner.motor.space_vector import LEGS_ALIKE_DEG, is_aslant
 from commissioner.records import StandstillRecording
 
 COPPER_ZERO_DEGC = -234.5
@@ -306,7 +307,12 @@ def axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
 
 
 def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, reached_wb: float) -> list[str]:
-    remarks = []
+    remarks = [
+        f"axis {r.axis_deg:g} deg is no multiple of {LEGS_ALIKE_DEG:g} deg: what the inverter's legs lose drives a current beside it; standard "
+        "errors are widened for it"
+        for r in results
+        if is_aslant(r.axis_deg) and r.batch.model.leg is not None
+    ]
     for result in results:
         if result.disagreement_sigmas > LARGEST_DISAGREEMENT:
             remarks.append(

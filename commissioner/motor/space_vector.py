@@ -36,3 +36,14 @@ def phase_cosines(axis_deg: float) -> tuple[float, float, float]:
     The same numbers times 2/3 weight phase voltages into the axis voltage.
     """
     return tuple(math.cos(math.radians(axis_deg - shift)) for shift in (0.0, 120.0, 240.0))  # type: ignore[return-value]
+
+
+LEGS_ALIKE_DEG, ASLANT_DEG = 30.0, 0.5
+"""Legs of a bridge lose voltage along the axis alone where two of them carry the same current or one carries none: at multiples of the
+first. Half a degree beside them is still within the standard errors; at 5 degrees L_M was off by 12 of them, at 15 a sound drive's
+current beside the axis was taken for a sensor's fault."""
+
+
+def is_aslant(axis_deg: float) -> bool:
+    """Whether what an inverter's legs lose drives a current beside this axis."""
+    return abs((axis_deg + LEGS_ALIKE_DEG / 2) % LEGS_ALIKE_DEG - LEGS_ALIKE_DEG / 2) > ASLANT_DEG

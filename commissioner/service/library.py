@@ -19,7 +19,15 @@ from commissioner.recordings.whole import write_text
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
 from commissioner.service.problems import Refusal, Unknown
-from commissioner.settings import CONFIG_FOLDER, MotorFile, ProcedureFile, load_motor, must_agree, read_toml
+from commissioner.settings import (
+    CONFIG_FOLDER,
+    MotorFile,
+    ProcedureFile,
+    load_motor,
+    plan_of,
+    read_toml,
+    require_possible,
+)
 from commissioner.text import did_you_mean
 from commissioner.validation import requirement
 
@@ -129,8 +137,9 @@ class Library:
         return _found(self.procedures(), identifier, "procedure")
 
     def put_procedure(self, identifier: str, table: ProcedureFile) -> Procedure:
-        """Keep a procedure, new or changed. UsageError: its values contradict each other, or the id is the packaged one's."""
-        must_agree(table, f"procedure {identifier}")
+        """Keep a procedure, new or changed. UsageError: its values contradict each other, no run can be made of it, or the id is the packaged one's."""
+        source = f"procedure {identifier}"
+        require_possible(plan_of(table.model_dump(), source), source)
         _must_be_new([STANDARD], identifier)
         tables = (f"[{name}]\n{_toml(values)}" for name, values in table.model_dump().items())
         _write(self._data / "procedures" / f"{identifier}.toml", "\n".join(tables))

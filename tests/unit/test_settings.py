@@ -260,6 +260,26 @@ def test_a_run_may_be_as_long_as_its_one_test_and_a_test_just_longer_than_its_to
     path = tmp_path / "procedure.toml"
     text = (CONFIG_FOLDER / "procedure.toml").read_text()
     path.write_text(
-        text.replace("total_time_s = 240.0", "total_time_s = 16.0").replace("\nseconds = 4.6", "\nseconds = 15.9")
+        text.replace("total_time_s = 240.0", "total_time_s = 23.1").replace("\nseconds = 4.6", "\nseconds = 15.9")
     )
-    assert load_procedure(path).limits.total_time_s == 16.0
+    assert load_procedure(path, (0.0,)).limits.total_time_s == 23.1
+    with pytest.raises(
+        ConfigurationError
+    ) as caught:  # four tests of it were ended at the limit, the motor energised in vain
+        load_procedure(path)
+    assert (caught.value.key, caught.value.value) == ("limits.total_time_s", 23.1)
+    assert caught.value.limit == "at least 92 s, which 4 axis tests take"
+
+
+@pytest.mark.parametrize("axis_deg", [17.0, 45.0, -45.0, 1.0, 29.0, 359.0])
+def test_an_axis_beside_which_the_legs_drive_a_current_is_refused_before_anything_is_energised(axis_deg):
+    with pytest.raises(UsageError) as caught:
+        load_procedure(axes_deg=(0.0, axis_deg))
+    assert (caught.value.exit_code, caught.value.value) == (2, f"{axis_deg:g} deg")
+    assert "multiples of 30 deg" in str(caught.value.limit)
+
+
+def test_every_axis_on_which_the_legs_are_alike_is_taken():
+    axes_deg = tuple(30.0 * k for k in range(-6, 6))
+    assert load_procedure(axes_deg=axes_deg).axes_deg == axes_deg
+    assert load_procedure(axes_deg=(-0.4, 359.6, 90.4)).axes_deg == (-0.4, 359.6, 90.4)

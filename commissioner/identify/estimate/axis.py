@@ -26,6 +26,7 @@ from commissioner.identify.inverter.staircase import InverterError, Staircase, d
 from commissioner.identify.observer.offline import excited_part, observe
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.space_vector import is_aslant
 
 Estimator = Literal["pao", "lyapunov", "nls"]
 Matrix = NDArray[np.float64]
@@ -34,6 +35,8 @@ STILL = 1e-3
 POORER = 1.1
 """Of the earlier axis' residual: what a fit that begins like it may leave before the axis is also fitted as if it were the first. The
 model chosen for a small flux, bent as far as a larger one goes, left 1.36 of the noise."""
+ASLANT_SHARE = 0.5
+"""Of the current beside an aslant axis, relative to the one along it: the worst value of five motors was off by 1.5 times that."""
 LARGEST_DISAGREEMENT = 3.0
 """Joint standard errors between observer and batch fit beyond which the observer is not believed."""
 
@@ -43,8 +46,8 @@ class AxisResult:
     """One test: what the chosen estimator says, the batch fit beside it, and how far they are apart in standard
     errors.
 
-    `law_error` (4,): relative, what an estimator that stands for itself misses of the least squares on the same samples.
-    It is part of `covariance` (4, 4).
+    `law_error` (4,): relative, what an estimator that stands for itself misses of the least squares on the same samples, and
+    what an inverter may do on an axis that is `aslant`. It is part of `covariance` (4, 4).
     """
 
     axis_deg: float
@@ -208,7 +211,8 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     own = np.square(observer.std) * np.square(np.array(at_flux.as_tuple()) / seen.as_tuple())
     disagreement = _disagreement(pao, at_flux, own + np.diag(covariance))
     values, least_squares = np.array(pao.as_tuple()), np.array(at_flux.as_tuple())
-    law_error = values / least_squares - 1.0 if estimator == "lyapunov" else np.zeros(4)
+    missed = values / least_squares - 1.0 if estimator == "lyapunov" else np.zeros(4)
+    law_error = np.hypot(missed, aslant_doubt(stretches, batch))
     of_batch = estimator == "nls" or batch.model.with_split  # the observer has its iron at the stator
     return AxisResult(
         axis_deg=axis_deg,
@@ -224,6 +228,15 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
         staircase=fit.staircase,
         energised_s=sum(s.voltage_v.size for s in stretches) * period_s,
     )
+
+
+def aslant_doubt(stretches: Sequence[Stretch], batch: BatchFit) -> float:
+    """Relative, of every value, where an inverter's losses drive a current beside the axis: the fit knows those of a current along it
+    only."""
+    if batch.model.leg is None or not is_aslant(stretches[0].axis_deg):
+        return 0.0
+    along_a = np.concatenate([s.current_a for s in stretches])
+    return ASLANT_SHARE * float(np.std(np.concatenate([s.cross_a for s in stretches])) / np.std(along_a))
 
 
 def _tones(stretches: Sequence[Stretch], period_s: float) -> list[Stretch]:

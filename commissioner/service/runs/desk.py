@@ -23,6 +23,7 @@ from commissioner.service.runs.control import Control, Pages, Party
 from commissioner.service.runs.feed import Feed
 from commissioner.service.runs.others import drive_at, going_on, request_of
 from commissioner.service.runs.watch import DriveWatch
+from commissioner.settings import load_procedure
 
 POLL_S, SUMMARY_S = 0.04, 0.095
 CONFIRM_S = 3.0
@@ -136,8 +137,9 @@ class Desk:
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
     def commissioning(self, axes_deg: Sequence[float], *, write_back: bool, procedure: Procedure) -> list[str]:
-        """The verb of an ordinary run."""
+        """The verb of an ordinary run. UsageError: no run can be made of these axes and this procedure."""
         chosen = axes_deg or self.settings.file.service.axes_deg
+        load_procedure(procedure.path, tuple(chosen) or None)
         axes = ["--axes", ",".join(f"{axis:g}" for axis in chosen)] if chosen else []
         more = ["--write-back"] if write_back else []
         more += ["--procedure", str(procedure.path)] if procedure.id != STANDARD else []

@@ -3,6 +3,7 @@
 import pytest
 from starlette.testclient import TestClient
 
+from commissioner.errors import UsageError
 from commissioner.service.access.accounts import Role
 from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings
@@ -89,10 +90,16 @@ def test_a_procedure_that_was_sent_is_kept_and_chosen_by_its_id(client):
     for wrong, named in (
         ({"id": "late", "procedure": late}, "watchdog_s"),
         ({"id": "bad", "procedure": LONGER | {"x": 1}}, "x"),
+        (
+            {"id": "aslant", "procedure": LONGER | {"axes": LONGER["axes"] | {"orientations_deg": [0, 45]}}},
+            "axis 45 deg",
+        ),
         ({"id": "standard", "procedure": LONGER}, "standard"),
     ):
         answer = client.post("/api/procedures", json=wrong, headers={"x-csrf-token": login["csrf"]})
         assert answer.status_code == 422 and named in answer.json()["title"]
+    with pytest.raises(UsageError, match="axis 45 deg"):
+        parts.desk.commissioning([0, 45], write_back=False, procedure=longer)
 
 
 @pytest.mark.parametrize(("method", "path"), [("GET", "/nosuch"), ("PUT", "/api/health"), ("GET", "/api/compare")])
