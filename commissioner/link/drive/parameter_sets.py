@@ -79,7 +79,7 @@ class ParameterSets:
         for name, value in wanted.items():
             if not self.items.same_words(name, seen[name], value):
                 raise DriveFault(
-                    f"the drive holds {name} = {seen[name]} instead of {value}",
+                    f"the drive holds another {name} than was asked for",
                     step=step,
                     value=seen[name],
                     limit=value,
