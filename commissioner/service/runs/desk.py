@@ -21,7 +21,7 @@ from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import Child
 from commissioner.service.runs.control import Control, Pages, Party
 from commissioner.service.runs.feed import Feed
-from commissioner.service.runs.others import drive_at, going_on, request_of
+from commissioner.service.runs.others import drive_at, going_on, is_copied, request_of
 from commissioner.service.runs.watch import DriveWatch
 
 POLL_S, SUMMARY_S = 0.04, 0.095
@@ -264,7 +264,7 @@ class Desk:
             return
         feed = Feed(folder)
         feed.poll()
-        if feed.state.is_over:
+        if feed.state.is_over or (folder.name not in self._holding and is_copied(folder, feed.state.utc)):
             return
         drive = await asyncio.to_thread(drive_at, self.library, str(request.get("url", "")))
         if drive is not None:
