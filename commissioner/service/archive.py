@@ -10,10 +10,11 @@ from pathlib import Path
 from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
+from commissioner.operations.history.runs import must_be_findable
 from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.documents import read_document, read_result
 from commissioner.run.archive.summary import AS_BEFORE
-from commissioner.run.index.rows import utc_of
+from commissioner.run.index.rows import Wanted, utc_of
 from commissioner.service.contract.runs import RunWithoutResult
 from commissioner.service.problems import Refusal
 
@@ -54,7 +55,8 @@ class Archive:
     def entries(
         self, *, motor: str = "", drive: str = "", outcome: str = "", since: str = "", limit: int = 100
     ) -> list[Entry]:
-        """Newest first."""
+        """Newest first. UsageError: a date that is none, an outcome that no run has."""
+        must_be_findable(Wanted(outcome=outcome, since=since))
         found: list[Entry] = []
         for name in self._names():
             entry = self._entry(name)
