@@ -29,7 +29,7 @@ SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safet
         "link/drive", "procedure/tuned.py")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
 FACTS = ("what", "title", "remedy")
-NOT_SHOWN = re.compile(r"no such scenario|POST /api|choose one of these$|^7 in the drive$|nameplate7$|^7 is 7$|^$")
+NOT_SHOWN = re.compile(r"^there is no 7 7$|POST /api|choose one of these$|^7 in the drive$|nameplate7$|^7 is 7$|^$")
 """Of scripts alone; and the drive's plate, whose checks have a name for each of its keys."""
 
 
