@@ -12,7 +12,7 @@ from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
 from commissioner.operations.history.runs import must_be_findable
 from commissioner.run.archive.catalogue import read_run
-from commissioner.run.archive.documents import read_document, read_result
+from commissioner.run.archive.documents import identified, read_document, read_result
 from commissioner.run.archive.summary import AS_BEFORE
 from commissioner.run.index.rows import Wanted, utc_of
 from commissioner.service.contract.runs import RunWithoutResult
@@ -138,7 +138,6 @@ def _read_entry(folder: Path) -> Entry:
     request = folder / "request.json"
     asked = read_document(request.read_text("utf-8", "replace")) if request.is_file() else {}
     origin, plate = (part if isinstance(part := asked.get(name), dict) else {} for name in ("origin", "nameplate"))
-    parameters = (summary.result or {}).get("parameters")
     return Entry(
         summary.run,
         utc_of(summary.run),
@@ -152,7 +151,7 @@ def _read_entry(folder: Path) -> Entry:
         summary.reason,
         summary.energised_s,
         summary.written,
-        parameters if isinstance(parameters, dict) else None,
+        identified(summary.result or {}, with_errors=False),
         (summary.result or {}).get("holds_for_stator_flux_wb"),
         folder,
     )

@@ -10,10 +10,12 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, Response
+from jinja2 import UndefinedError
 from pydantic import ValidationError
 
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
+from commissioner.run.archive.documents import damaged, identified
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -338,9 +340,17 @@ async def run(request: Request, run: str) -> Response:
         "losses": await asyncio.to_thread(losses_at_sight, entry.folder) if is_over else (),
         "has_report": (entry.folder / "report.html").is_file(),
     }
+    try:
+        return _ended_page(request, place, facts)
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, UndefinedError) as error:
+        raise damaged(entry.folder, "result.json", str(error)) from error
+
+
+def _ended_page(request: Request, place: Place, facts: Mapping[str, Any]) -> Response:
+    entry, result = facts["entry"], facts["result"]
     if (result.get("tune") or {}).get("rows"):
         return tuned_page(request, place, **facts)
-    if result.get("parameters") and entry.outcome in ("commissioned", "rejected"):
+    if identified(result) is not None and entry.outcome in ("commissioned", "rejected"):
         is_written = entry.standing == "commissioned"
         return render(request, DONE if is_written else RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
