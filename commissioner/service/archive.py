@@ -12,7 +12,7 @@ from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
 from commissioner.operations.history.runs import must_be_findable
 from commissioner.run.archive.catalogue import read_run
-from commissioner.run.archive.documents import identified, read_document, read_result
+from commissioner.run.archive.documents import identified, origin_of, read_document, read_result
 from commissioner.run.archive.summary import AS_BEFORE
 from commissioner.run.index.rows import Wanted, utc_of
 from commissioner.service.contract.runs import RunWithoutResult
@@ -137,13 +137,13 @@ def _read_entry(folder: Path) -> Entry:
     summary = read_run(folder)
     request = folder / "request.json"
     asked = read_document(request.read_text("utf-8", "replace")) if request.is_file() else {}
-    origin, plate = (part if isinstance(part := asked.get(name), dict) else {} for name in ("origin", "nameplate"))
+    origin, plate = origin_of(asked), asked.get("nameplate")
     return Entry(
         summary.run,
         utc_of(summary.run),
         str(origin.get("motor", "")),
         summary.motor_names,
-        plate_words(plate),
+        plate_words(plate if isinstance(plate, dict) else {}),
         summary.drive,
         str(origin.get("person", "")),
         summary.outcome,

@@ -69,6 +69,11 @@ def read_result(folder: Path) -> JsonObject | None:
     return document
 
 
+def origin_of(request: Mapping[str, Any]) -> JsonObject:
+    """Who asked for the run, its drive and motor by the service's lists; empty of a run from the command line, or where it is none."""
+    return origin if isinstance(origin := request.get("origin"), dict) else {}
+
+
 def identified(document: Mapping[str, Any], *, with_errors: bool = True) -> JsonObject | None:
     """The parameters of a result that has all four, each finite and above zero with a finite error; None of any other, also where somebody
     changed the file. Without `with_errors` an error may be missing, as of a version that told none."""

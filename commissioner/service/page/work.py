@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
-from commissioner.run.archive.documents import damaged, identified
+from commissioner.run.archive.documents import damaged, identified, origin_of
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -328,7 +328,7 @@ async def run(request: Request, run: str) -> Response:
     entry = parts.archive.find(run)
     asked = parts.archive.request(run)
     result: Mapping[str, Any] = parts.archive.result(run)
-    place = Place(run=run, drive=str((asked.get("origin") or {}).get("drive", "")))
+    place = Place(run=run, drive=str(origin_of(asked).get("drive", "")))
     state = live.feed.state if live is not None else whole(entry.folder).state
     is_over = live is None or live.is_over
     facts: dict[str, Any] = {
@@ -409,7 +409,7 @@ async def _written(request: Request, run: str, what: Act) -> Response:
         done=done.get("report") or done,
         units=_units(drive_of(parts, run)),
         who_wrote=who.person,
-        motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
+        motor=str(origin_of(parts.archive.request(run)).get("motor", "")),
     )
 
 
@@ -422,7 +422,7 @@ def _units(drive: Drive | None) -> dict[str, str]:
 
 
 def _place(parts: Parts, run: str) -> Place:
-    return Place(run=run, drive=str((parts.archive.request(run).get("origin") or {}).get("drive", "")))
+    return Place(run=run, drive=str(origin_of(parts.archive.request(run)).get("drive", "")))
 
 
 def _slug(name: str, taken: set[str]) -> str:

@@ -20,20 +20,40 @@ def cut_off(folder, ago):
     return folder
 
 
-@pytest.mark.parametrize(("ago", "is_shown"), [(dt.timedelta(0), True), (dt.timedelta(hours=3), False)])
-def test_a_folder_copied_by_hand_is_no_run_that_goes_on(tmp_path, ago, is_shown):
-    desk = make_parts(Settings(tmp_path / "runs", tmp_path / "data")).desk
-    folder = cut_off(tmp_path / "runs" / "20260101-000000-simulated-abcdef", ago)
+def live(runs):
+    """Ids of the runs that the service takes to go on, a moment after it began to look."""
+    desk = make_parts(Settings(runs, runs.parent / "data")).desk
 
     async def look():
         looking = asyncio.create_task(desk.look_around())
         await asyncio.sleep(0.2)
         seen = [run.id for run in desk.live()]
+        assert not looking.done()
         desk.is_closing = True
-        looking.cancel()
-        for run in desk.runs.values():
-            if run.follower is not None:
-                run.follower.cancel()
+        for task in (looking, *(run.follower for run in desk.runs.values() if run.follower is not None)):
+            task.cancel()
         return seen
 
-    assert asyncio.run(look()) == ([folder.name] if is_shown else [])
+    return asyncio.run(look())
+
+
+@pytest.mark.parametrize(("ago", "is_shown"), [(dt.timedelta(0), True), (dt.timedelta(hours=3), False)])
+def test_a_folder_copied_by_hand_is_no_run_that_goes_on(tmp_path, ago, is_shown):
+    folder = cut_off(tmp_path / "runs" / "20260101-000000-simulated-abcdef", ago)
+    assert live(tmp_path / "runs") == ([folder.name] if is_shown else [])
+
+
+STRANGE = (
+    {"kind": "run_ended", "record": 7}, {"kind": "estimate_updated", "record": {"parameters": None}}, {"kind": [], "record": {}},
+    {"kind": "axis_finished", "record": []}, {"kind": "drive_identified", "record": {}}, {"kind": "error", "record": "x"}, {"n": "x", "kind": "error", "record": {}},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("line", STRANGE)
+def test_a_folder_that_is_none_of_ours_hides_no_run_that_goes_on(tmp_path, line):
+    good = cut_off(tmp_path / "runs" / "20260101-000000-simulated-abcdef", dt.timedelta(0))
+    strange = cut_off(tmp_path / "runs" / "20260102-000000-simulated-abcdef", dt.timedelta(0))
+    (strange / "request.json").write_text(json.dumps({"url": 7, "origin": -1}))
+    with (strange / "journal.jsonl").open("a") as file:
+        file.write(json.dumps({"n": 1, "utc": dt.datetime.now(dt.UTC).isoformat()} | line) + "\n")
+    assert good.name in live(tmp_path / "runs")
