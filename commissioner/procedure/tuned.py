@@ -211,7 +211,7 @@ def _objections(item: Item, row: TunedRow) -> Iterator[Objection]:
     low, high = item.minimum, item.maximum
     if not (-math.inf if low is None else low) <= row.median <= (math.inf if high is None else high):
         yield Objection(
-            f"{plain_name(row.name)} is none that the drive file allows", row.median, f"{low} ... {high}",
+            f"{plain_name(row.name)} is none that the drive file allows", row.median, item.bounds,
             "check the item's address, width and scale in the drive file",
         )  # fmt: skip
         return

@@ -97,7 +97,7 @@ def _encode_element(item: Item, value: object) -> Words:
         raise _unfit(item, value, "a finite number")
     low, high = item.minimum, item.maximum
     if (low is not None and value < low) or (high is not None and value > high):
-        raise _unfit(item, value, f"{item.minimum} ... {item.maximum} {item.unit}".rstrip())
+        raise _unfit(item, value, f"{item.bounds} {item.unit}".rstrip())
     raw = value if item.scale == 1.0 else value / item.scale
     packed = _pack_real(item, value, raw) if item.type == "f32" else _pack_whole(item, value, raw)
     words = struct.unpack(f">{len(packed) // 2}H", packed)

@@ -118,6 +118,13 @@ class Item:
         return self.address if self.parameter is None else self.parameter
 
     @property
+    def bounds(self) -> str:
+        """What the drive file allows: `2 ... 9`, `at least 2`, `at most 9`, in its unit."""
+        ends = [f"{end:.10g}" for end in (self.minimum, self.maximum) if end is not None]
+        side = "" if len(ends) == 2 else "at most " if self.minimum is None else "at least "
+        return side + " ... ".join(ends)
+
+    @property
     def words(self) -> int:
         """Registers the item takes."""
         return self.length * WORDS_PER_ELEMENT[self.type]

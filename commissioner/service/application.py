@@ -17,7 +17,7 @@ from starlette.types import Scope
 
 from commissioner.service import problems
 from commissioner.service.access.accounts import Role
-from commissioner.service.access.gate import Gate
+from commissioner.service.access.gate import HEADERS, Gate
 from commissioner.service.access.visitors import check_role, visitor_of
 from commissioner.service.contract.description import describe_answers
 from commissioner.service.page import views
@@ -69,6 +69,7 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     )
     app.state.parts, app.state.url = parts, url
     problems.install(app, views.answer)
+    app.add_exception_handler(Exception, _fail)
     views.install(app)
     for router in all_routers():
         app.include_router(router)
@@ -76,6 +77,13 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     describe_answers(app)
     app.mount("/static", _Static(directory=STATIC), name="static")
     return app
+
+
+async def _fail(request: Request, error: Exception) -> Response:
+    """Outside of the gate, so with its headers."""
+    response = views.answer(request, problems.surprise(error))
+    response.headers.update(HEADERS)
+    return response
 
 
 def _refuse_upload(request: Request) -> Response | None:

@@ -10,10 +10,11 @@ from pathlib import Path
 from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
+from commissioner.operations.history.runs import must_be_findable
 from commissioner.run.archive.catalogue import read_run
-from commissioner.run.archive.documents import read_document, read_result
+from commissioner.run.archive.documents import identified, origin_of, read_document, read_result
 from commissioner.run.archive.summary import AS_BEFORE
-from commissioner.run.index.rows import utc_of
+from commissioner.run.index.rows import Wanted, utc_of
 from commissioner.service.contract.runs import RunWithoutResult
 from commissioner.service.problems import Refusal
 
@@ -54,7 +55,8 @@ class Archive:
     def entries(
         self, *, motor: str = "", drive: str = "", outcome: str = "", since: str = "", limit: int = 100
     ) -> list[Entry]:
-        """Newest first."""
+        """Newest first. UsageError: a date that is none, an outcome that no run has."""
+        must_be_findable(Wanted(outcome=outcome, since=since))
         found: list[Entry] = []
         for name in self._names():
             entry = self._entry(name)
@@ -135,14 +137,13 @@ def _read_entry(folder: Path) -> Entry:
     summary = read_run(folder)
     request = folder / "request.json"
     asked = read_document(request.read_text("utf-8", "replace")) if request.is_file() else {}
-    origin, plate = (part if isinstance(part := asked.get(name), dict) else {} for name in ("origin", "nameplate"))
-    parameters = (summary.result or {}).get("parameters")
+    origin, plate = origin_of(asked), asked.get("nameplate")
     return Entry(
         summary.run,
         utc_of(summary.run),
         str(origin.get("motor", "")),
         summary.motor_names,
-        plate_words(plate),
+        plate_words(plate if isinstance(plate, dict) else {}),
         summary.drive,
         str(origin.get("person", "")),
         summary.outcome,
@@ -150,7 +151,7 @@ def _read_entry(folder: Path) -> Entry:
         summary.reason,
         summary.energised_s,
         summary.written,
-        parameters if isinstance(parameters, dict) else None,
+        identified(summary.result or {}, with_errors=False),
         (summary.result or {}).get("holds_for_stator_flux_wb"),
         folder,
     )

@@ -81,6 +81,14 @@ def refusal_of(error: CommissionerError, named: Container[str] = ()) -> Refusal:
     )  # fmt: skip
 
 
+def surprise(error: Exception) -> Refusal:
+    """What nobody foresaw, in the form of every refusal: the page keeps its STOP. The server writes the traceback into its log."""
+    return Refusal(
+        500, "the service failed at this", step="answer", value=type(error).__name__, limit="an answer",
+        remedy="go back; STOP works; the service's log says where it failed",
+    )  # fmt: skip
+
+
 def disk_refuses(failure: OSError) -> Refusal:
     """What needs an entry on the disk is not done without one; a name that no disk takes is not the disk's fault."""
     if failure.errno == errno.ENAMETOOLONG:

@@ -14,7 +14,7 @@ from commissioner.report.run.quantities import BY_FIELD, FOUR
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
 from commissioner.report.sheet.drawing import Panel, Range, padded
-from commissioner.report.sheet.numbers import counted, digits, half_width, with_interval
+from commissioner.report.sheet.numbers import digits, half_width, spelled, with_interval
 from commissioner.report.sheet.words import spoken
 from commissioner.study.rows import Row
 from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, relative_errors
@@ -39,7 +39,7 @@ def page(rows: Sequence[Row], seen: Summary, title: str) -> str:
             parts.append(marks.table((marks.Column(head), marks.Column("Cases", right=True)), counts))
     if any(group.errors for group in seen.effects):
         parts.append(_by_effect(seen.effects))
-    margins = Margins("Study", "", title, "", f"{counted(seen.cases, 'case')}, {seen.cpu_s:.0f} CPU-s")
+    margins = Margins("Study", "", title, "", f"{spelled(seen.cases, 'case')}, {seen.cpu_s:.0f} CPU-s")
     return document(title, margins, [Page("study", "Study", Markup("\n").join(parts))])
 
 

@@ -69,8 +69,8 @@ class Summary:
 
 def summarise(rows: Sequence[Row]) -> Summary:
     """Over all rows; parameters over those that were commissioned."""
-    reasons = counted([f"{row['outcome']}: {row['reason']}"] for row in rows if row["outcome"] not in ANSWERED)
-    remarks = counted((row.get("remarks") or "").splitlines() for row in rows)
+    reasons = tallied([f"{row['outcome']}: {row['reason']}"] for row in rows if row["outcome"] not in ANSWERED)
+    remarks = tallied((row.get("remarks") or "").splitlines() for row in rows)
     flux = [fraction for row in rows if (fraction := row.get("peak_flux_fraction")) is not None]
     whole = _group("all", rows)
     return Summary(
@@ -79,7 +79,7 @@ def summarise(rows: Sequence[Row]) -> Summary:
     )  # fmt: skip
 
 
-def counted(cases: Iterable[Iterable[str]]) -> dict[str, int]:
+def tallied(cases: Iterable[Iterable[str]]) -> dict[str, int]:
     """In how many cases each sentence stands, the most frequent first. Those that differ in numbers only are one: `…` for such a number."""
     holders: defaultdict[str, set[int]] = defaultdict(set)
     numbers: defaultdict[str, list[list[str]]] = defaultdict(list)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from commissioner.cli.screens import screen
 from commissioner.errors import CommissionerError
-from commissioner.report.sheet.numbers import counted
+from commissioner.report.sheet.numbers import spelled
 from commissioner.study.campaign import CaseEnded, Studied, StudyRequest, carry_out
 from commissioner.study.rows import DEFECT
 
@@ -28,7 +28,7 @@ def _progress(ended: CaseEnded) -> None:
 
 
 def _show(done: Studied) -> None:
-    screen.out.print(f"[bold]{counted(done.cases, 'case')}[/], {done.per_minute:.1f} a minute")
+    screen.out.print(f"[bold]{spelled(done.cases, 'case')}[/], {done.per_minute:.1f} a minute")
     rows = [(outcome, str(number), f"{100 * number / done.cases:.1f} %") for outcome, number in done.outcomes.items()]
     screen.out.print(screen.table("", ("outcome", "cases", "share"), rows, right=(1, 2)))
     errors = [

@@ -88,13 +88,11 @@ class Staged:
             self._sleep(POLL_S)
             result = int(self._items.read_number(item))
         if result != DONE:
+            meaning = meanings.get(result, "unknown result")
             raise DriveFault(
-                f"the drive did not {step}: {meanings.get(result, 'unknown result')}",
-                step=step,
-                value=result,
-                limit=DONE,
+                f"the drive did not {step}: {meaning}", step=step, value=f"{meaning} ({result})", limit=f"done ({DONE})",
                 remedy="check the values against the drive's ranges and that it is stopped",
-            )
+            )  # fmt: skip
 
 
 class Direct:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,12 +31,7 @@ def find_runs(archive: Archive, wanted: Wanted | None = None) -> Found:
     """Newest first, all of them where nothing is wanted; a folder that cannot be read is a row that says so. UsageError: a date
     that is none, an outcome that no run has."""
     wanted = wanted or Wanted()
-    if wanted.outcome and wanted.outcome not in STANDINGS:
-        raise UsageError(
-            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(STANDINGS), remedy="give --outcome one of these",
-        )  # fmt: skip
-    for name in ("since", "until"):
-        _check_date(getattr(wanted, name), name)
+    must_be_findable(wanted)
     return look_up(archive.runs, wanted, archive.database)
 
 
@@ -76,13 +72,27 @@ def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:
     return bring_into_step(archive.runs, archive.database, rebuild=rebuild)
 
 
+def must_be_findable(wanted: Wanted) -> None:
+    """UsageError: a date that is none, an outcome that no run has; an empty list would say that there is no such run."""
+    if wanted.outcome and wanted.outcome not in STANDINGS:
+        raise UsageError(
+            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(STANDINGS), remedy="give --outcome one of these",
+        )  # fmt: skip
+    for name in ("since", "until"):
+        _check_date(getattr(wanted, name), name)
+
+
 def _check_date(value: str, name: str) -> None:
-    shape = "2026-11-25T10:17:45"
-    fits = value == "" or (
-        len(value) >= 4 and all(a.isdigit() if b.isdigit() else a == b for a, b in zip(value, shape, strict=False))
+    shape, rest = "2026-11-25T10:17:45", "2026-10-10T10:00:00"
+    is_begun = len(value) >= 4 and all(
+        a.isdigit() if b.isdigit() else a == b for a, b in zip(value, shape, strict=False)
     )
+    try:
+        fits = not value or (is_begun and bool(dt.datetime.fromisoformat(value + rest[len(value) :])))
+    except ValueError:  # a month or day that no year has
+        fits = False
     if not fits:
         raise UsageError(
-            f"--{name} is no date", step="archive", value=value, limit=f"{shape[:4]}, {shape[:7]}, {shape[:10]} or {shape}, UTC",
+            f"{name} is no date", step="archive", value=value, limit=f"{shape[:4]}, {shape[:7]}, {shape[:10]} or {shape}, UTC",
             remedy="write year, month and day with four, two and two digits",
         )  # fmt: skip

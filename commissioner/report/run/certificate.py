@@ -16,7 +16,7 @@ from commissioner.report.run.standing import ACCEPTED
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
-from commissioner.report.sheet.numbers import counted, digits, half_width, held, like, percent, signed, with_interval
+from commissioner.report.sheet.numbers import digits, half_width, held, like, percent, signed, spelled, with_interval
 from commissioner.report.sheet.words import NBSP, seen_and_limit, spoken, typeset
 
 _COLUMNS = (
@@ -66,7 +66,7 @@ def _verdict(subject: Subject) -> Markup:
 def _said(subject: Subject) -> tuple[str, Text]:
     """Title and sentence; the title of a run that went wrong says what the drive holds."""
     tests = len(subject.tests)
-    agree = f", the {counted(tests, 'test')} agree" if tests > 1 else ""
+    agree = f", the {spelled(tests, 'test')} agree" if tests > 1 else ""
     if subject.standing == ACCEPTED:
         return (
             "Accepted, not written: the drive holds its old values",
@@ -78,7 +78,7 @@ def _said(subject: Subject) -> tuple[str, Text]:
         )
     if subject.is_good:
         return (
-            f"Commissioned: {counted(len(subject.written), 'value')} accepted, written and read back",
+            f"Commissioned: {spelled(len(subject.written), 'value')} accepted, written and read back",
             f"Each value is surer than it must be{agree}, and {_within(subject)}. {_kept(subject)}",
         )
     reason = _said_by(subject.result["reason"])
@@ -176,7 +176,7 @@ def _how_far(subject: Subject) -> str:
     """What was energised: tests of tones, or what comes before them."""
     if not subject.estimates and subject.samples:
         return "direct current; no test begun"
-    return f"{counted(len(subject.estimates), 'test')} begun"
+    return f"{spelled(len(subject.estimates), 'test')} begun"
 
 
 def _apart(subject: Subject) -> tuple[Text, str, str]:
@@ -249,7 +249,7 @@ def _measurement(subject: Subject) -> Markup:
     rows.append(
         (
             "Energised",
-            _energised(result) + (f" in {counted(len(subject.tests), 'test')}: {axes}" if axes else ""),
+            _energised(result) + (f" in {spelled(len(subject.tests), 'test')}: {axes}" if axes else ""),
         )
     )
     if (seconds := subject.seconds) is not None:
@@ -400,7 +400,7 @@ def _unchecked(subject: Subject) -> Iterator[Text]:
             )
     done, planned = subject.tests_done, len(subject.planned_deg)
     if planned > done:
-        yield f"{counted(planned - done, 'test')} of {planned}: the run ended before"
+        yield f"{spelled(planned - done, 'test')} of {planned}: the run ended before"
     yield "anything that turns: iron loss at speed, phase order, encoder"
     yield "insulation, earth, bearings, thermal protection"
     checks = subject.result.get("checks") or ()

@@ -15,7 +15,7 @@ from commissioner.report.run.quantities import FOUR, Quantity
 from commissioner.report.run.subject import Record, Session, Subject, Test
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.drawing import Panel, envelope, padded
-from commissioner.report.sheet.numbers import counted, digits, half_width, with_interval
+from commissioner.report.sheet.numbers import digits, half_width, spelled, with_interval
 
 WINDOW_S = 0.03
 """Of the envelope that stands for a line of many samples."""
@@ -238,7 +238,7 @@ def _while_measuring(subject: Subject) -> Markup:
         "Values while measuring",
         marks.multiples(panels, 4),
         caption,
-        aside=f"{counted(len(tests), 'test')}; black: the result",
+        aside=f"{spelled(len(tests), 'test')}; black: the result",
     )
 
 

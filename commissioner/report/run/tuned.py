@@ -11,7 +11,7 @@ from commissioner.records import drive_words, plain_name
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
-from commissioner.report.sheet.numbers import counted, digits, held, signed
+from commissioner.report.sheet.numbers import digits, held, signed, spelled
 from commissioner.report.sheet.words import seen_and_limit, spoken
 
 _COLUMNS = (
@@ -54,7 +54,7 @@ def _facts(subject: Subject, tune: Record) -> Iterator[tuple[Text, Text]]:
     if drive:
         yield "Drive", drive_words(str(drive["drive_type"]), drive["serial_number"])
     yield "It holds", str(tune["in_the_drive"])
-    yield "Tuned", f"{counted(len(tune['repeats']), 'time')}, {tune['form']}"
+    yield "Tuned", f"{spelled(len(tune['repeats']), 'time')}, {tune['form']}"
     for remark in subject.result.get("remarks") or ():
         yield "Remark", spoken(str(remark))
 

@@ -62,7 +62,7 @@ def percent(share: float) -> str:
     return f"{digits(100.0 * share, 2)} %"
 
 
-def counted(number: int, noun: str) -> str:
+def spelled(number: int, noun: str) -> str:
     """`one test`, `four tests`."""
     words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
     return f"{words[number] if number < len(words) else number} {noun}{'' if number == 1 else 's'}"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, DataRefused
+from commissioner.motor.quantities import FIVE, FOUR
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -64,6 +67,37 @@ def read_result(folder: Path) -> JsonObject | None:
             seen = f"{where}: {wrong[0]['msg']}, not {wrong[0]['input']!r:.80}"
             raise damaged(folder, "result.json", seen) from error
     return document
+
+
+def origin_of(request: Mapping[str, Any]) -> JsonObject:
+    """Who asked for the run, its drive and motor by the service's lists; empty of a run from the command line, or where it is none."""
+    return origin if isinstance(origin := request.get("origin"), dict) else {}
+
+
+def identified(document: Mapping[str, Any], *, with_errors: bool = True) -> JsonObject | None:
+    """The parameters of a result that has all four, each finite and above zero with a finite error; None of any other, also where somebody
+    changed the file. Without `with_errors` an error may be missing, as of a version that told none."""
+    parameters = document.get("parameters")
+    if not isinstance(parameters, dict):
+        return None
+    told = [parameters.get(of.field) for of in FIVE if of in FOUR or of.field in parameters]
+    return parameters if all(is_quantity(one, has_error=with_errors) for one in told) else None
+
+
+def is_quantity(found: object, *, has_error: bool = True) -> bool:
+    """A finite value above zero with a finite standard error; without `has_error` that may be missing."""
+    if not isinstance(found, dict):
+        return False
+    value, std = (number(found.get(key)) for key in ("value", "std"))
+    is_known = std is not None and std >= 0.0
+    return value is not None and value > 0.0 and (is_known or (not has_error and found.get("std") is None))
+
+
+def number(value: object) -> float | None:
+    """None where it is no finite number."""
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        return None
+    return float(value)
 
 
 @cache

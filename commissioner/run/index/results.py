@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,13 +13,13 @@ from commissioner.identify.estimate.axes import Combined
 from commissioner.identify.estimate.common_ground import Result
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.procedure.states import State
+from commissioner.run.archive.documents import identified, is_quantity, number
 from commissioner.run.archive.summary import RunSummary
 
 
 def has_result(run: RunSummary) -> bool:
     """True where the run's document has all four parameters, finite and above zero."""
-    parameters = (run.result or {}).get("parameters")
-    return isinstance(parameters, dict) and all(_is_quantity(parameters.get(name)) for name in PARAMETERS)
+    return identified(run.result or {}) is not None
 
 
 def result_of(run: RunSummary) -> Result:
@@ -43,15 +42,15 @@ def result_from(document: Mapping[str, Any], name: str) -> Result:
     return Result(
         name,
         combined,
-        _number(document.get("holds_for_stator_flux_wb")),
+        number(document.get("holds_for_stator_flux_wb")),
         _curve(document),
-        _number(document.get("winding_temperature_degc")),
+        number(document.get("winding_temperature_degc")),
     )
 
 
 def flux_level(parameters: Mapping[str, Any]) -> float | None:
     """The peak stator flux, Wb, that a run's L_M and T_R hold at; None where it said none."""
-    return _number((parameters.get("magnetizing_inductance_h") or {}).get("at_stator_flux_wb"))
+    return number((parameters.get("magnetizing_inductance_h") or {}).get("at_stator_flux_wb"))
 
 
 def _curve(document: Mapping[str, Any]) -> tuple[tuple[float, float, float], ...]:
@@ -60,19 +59,5 @@ def _curve(document: Mapping[str, Any]) -> tuple[tuple[float, float, float], ...
         (float(point["stator_flux_wb"]), float(point["magnetizing_inductance_h"]["value"]),
          float(point["magnetizing_inductance_h"]["std"]))
         for point in points
-        if isinstance(point, dict) and _is_quantity(point.get("magnetizing_inductance_h")) and "stator_flux_wb" in point
+        if isinstance(point, dict) and is_quantity(point.get("magnetizing_inductance_h")) and "stator_flux_wb" in point
     )  # fmt: skip
-
-
-def _number(value: object) -> float | None:
-    return (
-        float(value)
-        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-        else None
-    )
-
-
-def _is_quantity(found: object) -> bool:
-    """A finite value above zero with a finite standard error."""
-    value, std = (_number(found.get(key)) for key in ("value", "std")) if isinstance(found, dict) else (None, None)
-    return value is not None and std is not None and 0.0 < value < math.inf and 0.0 <= std < math.inf

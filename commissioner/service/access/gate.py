@@ -20,6 +20,11 @@ REPORT_CSP = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; font-src data:; frame-ancestors 'self'; sandbox"
 )
 """A report is one file with its own style and pictures: shown without script, form or link to anywhere."""
+HEADERS = {
+    "content-security-policy": CSP, "x-content-type-options": "nosniff", "referrer-policy": "same-origin", "x-frame-options": "SAMEORIGIN",
+    "cross-origin-opener-policy": "same-origin", "cross-origin-resource-policy": "same-origin", "cache-control": "no-store",
+}  # fmt: skip
+"""Of every answer that does not say otherwise."""
 SAFE = ("GET", "HEAD", "OPTIONS")
 BODY_BYTES, UPLOAD_BYTES = 1_000_000, 1_000_000_000
 """No request but an upload needs more than the first."""
@@ -98,13 +103,8 @@ def _with_headers(send: Send) -> Send:
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
-            headers.setdefault("content-security-policy", CSP)
-            headers.setdefault("x-content-type-options", "nosniff")
-            headers.setdefault("referrer-policy", "same-origin")
-            headers.setdefault("x-frame-options", "SAMEORIGIN")
-            headers.setdefault("cross-origin-opener-policy", "same-origin")
-            headers.setdefault("cross-origin-resource-policy", "same-origin")
-            headers.setdefault("cache-control", "no-store")
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
         await send(message)
 
     return sending

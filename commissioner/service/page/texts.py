@@ -22,7 +22,10 @@ from commissioner.service.problems import Refusal
 LANGUAGES = ("en", "de")
 UNIT_SIGNS = {"ohm": "Ω", "degC": "°C", "us": "µs", "1": ""}
 CORE = "core"
-"""Context of the catalogue's sentences that come from the core; their %(names)s stand for what the core filled in."""
+"""Context of the catalogue's sentences that come from the core; their %(names)s stand for what the core filled in, those that begin
+with `id` for what somebody called a thing: it stays as it is, also where it is a word of the catalogue."""
+
+_BOUND = re.compile(r"^(at least|at most) (?=-?\d)")
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,10 @@ def _pattern(message: str) -> re.Pattern[str]:
     return re.compile("".join(f"(?P<{p}>.+?)" if k % 2 else re.escape(p) for k, p in enumerate(parts)), re.DOTALL)
 
 
+def _is_name(gap: str) -> bool:
+    return gap.startswith("id")
+
+
 class Texts:
     """One language. What has no translation stays as it is."""
 
@@ -78,8 +85,15 @@ class Texts:
             return "; ".join(map(self.tell, parts))
         for pattern, translation in self._catalogue.sentences:
             if (found := pattern.fullmatch(said)) is not None:
-                return translation % {name: self._value(value) for name, value in found.groupdict().items()}
+                return translation % {k: v if _is_name(k) else self._value(v) for k, v in found.groupdict().items()}
         return said
+
+    def seen(self, what: str, value: Any, unit: str = "") -> str:
+        """The value of a refusal `what`, as `short` says it; one that the sentence names is no word to translate."""
+        found = (pattern.fullmatch(what) for pattern, _ in self._catalogue.sentences)
+        names = next((f.groupdict() for f in found if f is not None), {})
+        is_name = any(_is_name(k) and value in (v, v.strip("'")) for k, v in names.items())
+        return str(value) if is_name else self.short(value, unit)
 
     def person(self, name: str) -> str:
         """Who did it; whoever sits at this computer without an account is called by what they do."""
@@ -98,6 +112,8 @@ class Texts:
         version of three parts and a file's name are no number."""
         known = self._catalogue.messages
         said = known.get(text) or ", ".join(known.get(word, word) for word in text.split(", "))
+        said = self.tell(text) if said == text and " " in text else said  # a sentence within a sentence
+        said = _BOUND.sub(lambda side: self.gettext(side[1]) + " ", said)
         return (
             re.sub(r"(?<![\w./])(\d+)\.(\d+(?:e[+-]?\d+)?)(?![\w./])", r"\1,\2", said)
             if self.language == "de"
@@ -142,7 +158,10 @@ class Texts:
                 head, *rest = text.split(NBSP)
                 text = NBSP.join([head.rstrip("0").rstrip(self._mark), *rest])
             return text
-        return self.gettext("no value") if value is None else self._value(self.tell(value))
+        if value is None:
+            return self.gettext("no value")
+        said = self.tell(value)
+        return said if said != str(value) else self._value(said)
 
 
 def texts_of(connection: HTTPConnection) -> Texts:

@@ -10,10 +10,12 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, Response
+from jinja2 import UndefinedError
 from pydantic import ValidationError
 
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
+from commissioner.run.archive.documents import damaged, identified, origin_of
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -326,7 +328,7 @@ async def run(request: Request, run: str) -> Response:
     entry = parts.archive.find(run)
     asked = parts.archive.request(run)
     result: Mapping[str, Any] = parts.archive.result(run)
-    place = Place(run=run, drive=str((asked.get("origin") or {}).get("drive", "")))
+    place = Place(run=run, drive=str(origin_of(asked).get("drive", "")))
     state = live.feed.state if live is not None else whole(entry.folder).state
     is_over = live is None or live.is_over
     facts: dict[str, Any] = {
@@ -338,9 +340,17 @@ async def run(request: Request, run: str) -> Response:
         "losses": await asyncio.to_thread(losses_at_sight, entry.folder) if is_over else (),
         "has_report": (entry.folder / "report.html").is_file(),
     }
+    try:
+        return _ended_page(request, place, facts)
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, UndefinedError) as error:
+        raise damaged(entry.folder, "result.json", str(error)) from error
+
+
+def _ended_page(request: Request, place: Place, facts: Mapping[str, Any]) -> Response:
+    entry, result = facts["entry"], facts["result"]
     if (result.get("tune") or {}).get("rows"):
         return tuned_page(request, place, **facts)
-    if result.get("parameters") and entry.outcome in ("commissioned", "rejected"):
+    if identified(result) is not None and entry.outcome in ("commissioned", "rejected"):
         is_written = entry.standing == "commissioned"
         return render(request, DONE if is_written else RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
@@ -399,7 +409,7 @@ async def _written(request: Request, run: str, what: Act) -> Response:
         done=done.get("report") or done,
         units=_units(drive_of(parts, run)),
         who_wrote=who.person,
-        motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
+        motor=str(origin_of(parts.archive.request(run)).get("motor", "")),
     )
 
 
@@ -412,7 +422,7 @@ def _units(drive: Drive | None) -> dict[str, str]:
 
 
 def _place(parts: Parts, run: str) -> Place:
-    return Place(run=run, drive=str((parts.archive.request(run).get("origin") or {}).get("drive", "")))
+    return Place(run=run, drive=str(origin_of(parts.archive.request(run)).get("drive", "")))
 
 
 def _slug(name: str, taken: set[str]) -> str:

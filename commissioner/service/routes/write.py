@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.encoding import JsonObject
 from commissioner.report.run.contract import WritePlan
+from commissioner.run.archive.documents import origin_of
 from commissioner.service.access.visitors import Operator, Visitor, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.writing import RestoredDocument, WrittenDocument
@@ -99,7 +100,7 @@ async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], w
 def drive_of(parts: Parts, run: str) -> Drive | None:
     """The drive of this library that the run was made on; None for one that is not in it."""
     asked = parts.archive.request(run)
-    name = (asked.get("origin") or {}).get("drive")
+    name = origin_of(asked).get("drive")
     for drive in parts.library.drives():
         if drive.url and (drive.id == name or drive.url == asked.get("url")):
             return drive

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from commissioner.run.archive.documents import origin_of
 from commissioner.run.holding.drive_lock import runs_holding
 from commissioner.run.stopping.dead_man import SERVICE
 from commissioner.run.stopping.stop_file import ask_to_stop
@@ -21,7 +22,7 @@ from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import Child
 from commissioner.service.runs.control import Control, Pages, Party
 from commissioner.service.runs.feed import Feed
-from commissioner.service.runs.others import drive_at, going_on, request_of
+from commissioner.service.runs.others import drive_at, going_on, is_copied, request_of
 from commissioner.service.runs.watch import DriveWatch
 from commissioner.settings import load_procedure
 
@@ -258,7 +259,7 @@ class Desk:
 
     def _is_beginning(self, folder: Path) -> bool:
         """Of our own: its child says so itself."""
-        return bool(self._pending) and bool(request_of(folder).get("origin"))
+        return bool(self._pending) and bool(origin_of(request_of(folder)))
 
     async def _take_up(self, folder: Path) -> None:
         request = request_of(folder)
@@ -266,12 +267,12 @@ class Desk:
             return
         feed = Feed(folder)
         feed.poll()
-        if feed.state.is_over:
+        if feed.state.is_over or (folder.name not in self._holding and is_copied(folder, feed.state.utc)):
             return
         drive = await asyncio.to_thread(drive_at, self.library, str(request.get("url", "")))
         if drive is not None:
             self.watch(drive).pause(0.0)
-        motor = str((request.get("origin") or {}).get("motor", ""))
+        motor = str(origin_of(request).get("motor", ""))
         self._add(LiveRun(folder.name, drive.id if drive else "", motor, feed, None))
 
     async def close(self) -> None:

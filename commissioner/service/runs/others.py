@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import datetime as dt
 import time
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from commissioner.service.library import Drive, Library
 
 FRESH_S = 5.0
 """A run without a lock here (another computer's on a share, or one that only diagnoses) goes on where its journal is so young."""
+COPIED_S = 60.0
+"""A journal's file is as old as its last line, but for what two computers' clocks differ by; a copy's is as old as the copying."""
 NEWEST = 20
 
 
@@ -28,6 +31,15 @@ def going_on(runs: Path, holding: frozenset[str]) -> list[Path]:
             if abs(age_s) < FRESH_S:  # a clock may have been set back
                 found.append(runs / name)
     return found
+
+
+def is_copied(folder: Path, last_utc: str) -> bool:
+    """Whether the journal's file is of another time than its last line: somebody copied it, no run writes it. OSError: it is gone."""
+    try:
+        written_s = dt.datetime.fromisoformat(last_utc).timestamp()
+    except ValueError:  # no line of ours
+        return True
+    return abs((folder / "journal.jsonl").stat().st_mtime - written_s) > COPIED_S
 
 
 def request_of(folder: Path) -> JsonObject:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -91,13 +92,14 @@ class RunState:
             self.tests[k].state = "running"
 
     def take(self, line: Mapping[str, Any]) -> None:
-        """One record of the journal."""
+        """One record of the journal. One of another form than ours, as somebody or another version wrote it, tells nothing more."""
         record = line["record"] if isinstance(line.get("record"), dict) else {}
-        self.records = int(line.get("n", self.records)) + 1
         self.utc = str(line.get("utc", ""))
         fold = _FOLDS.get(str(line["kind"]))
-        if fold is not None:
-            fold(self, record)
+        with contextlib.suppress(LookupError, TypeError, ValueError, AttributeError):
+            self.records = int(line.get("n", self.records)) + 1
+            if fold is not None:
+                fold(self, record)
 
 
 def _warming(state: RunState, _record: dict[str, Any]) -> None:

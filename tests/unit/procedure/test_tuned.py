@@ -42,6 +42,21 @@ def test_a_value_that_the_drive_file_does_not_allow_is_none():
     ]
 
 
+@pytest.mark.parametrize(
+    ("bounds", "said"),
+    [
+        ({"maximum": 1000.0}, "at most 1000"),
+        ({"minimum": 2.5e3}, "at least 2500"),
+        ({"minimum": 1.5, "maximum": 9.0}, "1.5 ... 9"),
+    ],
+)
+def test_a_drive_file_with_one_bound_says_that_one(bounds, said):
+    verdict = judge_tunings(
+        typed("u16", **bounds), [{"stator_resistance": 1203.0}] * 3, {"stator_resistance": 900}, PLATE, {}
+    )
+    assert [o.limit for o in verdict.objections] == [said]
+
+
 def test_a_tuning_that_changed_nothing_to_the_last_digit_has_not_tuned():
     assert objections([1203] * 3, before=1203) == [
         "the drive's tuning changed nothing: every result is what stood there before"

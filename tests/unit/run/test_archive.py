@@ -270,6 +270,19 @@ def test_an_outcome_that_no_run_has_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "since", ["2026", "2026-11", "2026-1", "2026-11-3", "2026-11-25T1", "2026-11-25T10:17:45Z", ""]
+)
+def test_as_much_of_a_date_as_one_likes_is_one(tmp_path, since):
+    assert not find_runs(RunFolders(tmp_path), Wanted(since=since)).rows
+
+
+@pytest.mark.parametrize("until", ["foo", "05.11.2026", "2026-13", "2026-02-31", "2026-11-25T25", "26", "２０２６"])
+def test_a_date_that_is_none_is_refused_and_no_empty_list(tmp_path, until):
+    with pytest.raises(UsageError, match="until is no date"):
+        find_runs(RunFolders(tmp_path), Wanted(until=until))
+
+
+@pytest.mark.parametrize(
     ("name", "path"),
     [
         ("summary.json", ("summary", "energised_s")),

@@ -34,3 +34,10 @@ def test_json_that_is_none_of_ours_is_a_problem_document(client, body):
 def test_an_address_that_is_none_is_another_sites(client):
     assert client.post("/api/stop", headers={"origin": "http://["}).status_code == 403
     assert client.post("/stop", headers={"referer": "http://["}, follow_redirects=False).headers["location"] == "/"
+
+
+@pytest.mark.parametrize("asked", ["since=05.11.2026", "since=2026-13", "outcome=nonsense"])
+def test_a_filter_that_cannot_be_is_told_and_no_archive_without_runs(client, asked):
+    page = client.get(f"/runs?{asked}", headers={"accept": "text/html", "accept-language": "de"})
+    assert page.status_code == client.get(f"/api/runs?{asked}").status_code == 422
+    assert "ist kein Datum" in page.text or "So endet kein Lauf" in page.text

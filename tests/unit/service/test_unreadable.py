@@ -1,15 +1,25 @@
-"""A request whose body is no JSON is told so, by the body and not by the number of a character."""
+"""What cannot be read: a body that is no JSON, a run's result that somebody changed, and what nobody foresaw."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
+import pytest
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
+from starlette.testclient import TestClient
 
+from commissioner.service.access.gate import CSP
+from commissioner.service.application import create_app
+from commissioner.service.configuration import Settings
+from commissioner.service.parts import make_parts
 from commissioner.service.problems import Refusal, install
+from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
 def test_a_broken_body_is_called_the_body() -> None:
@@ -24,3 +34,40 @@ def test_a_broken_body_is_called_the_body() -> None:
     said = asyncio.run(handler(Request({"type": "http"}), RequestValidationError([broken])))  # type: ignore[arg-type]
     problem = json.loads(bytes(said.body))
     assert (said.status_code, problem["title"], problem["limit"]) == (400, "the body cannot be used", "valid JSON")
+
+
+SPOILT = (
+    lambda result: result["parameters"].pop("stator_resistance_ohm"),
+    lambda result: result["parameters"]["rotor_resistance_ohm"].update(value=None),
+    lambda result: result["parameters"]["leakage_inductance_h"].update(std=None),
+    lambda result: result["parameters"].update(rotor_time_constant_s={}),
+    lambda result: result.update(axes=[None]),
+    lambda result: result.update(dispersion=None, axes=[{"axis_deg": 0.0}]),
+)
+
+
+@pytest.mark.parametrize("spoil", SPOILT)
+def test_a_result_that_somebody_changed_ends_no_list_and_no_page(tmp_path: Path, spoil: Callable[[Any], Any]) -> None:
+    good, bad = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
+    for name in (good, bad):
+        result = result_of(name, MACHINE)
+        if name == bad:
+            spoil(result)
+        make_run(tmp_path / "runs", name, result=result)
+    app = create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data")))
+    client = TestClient(app, base_url="http://127.0.0.1", raise_server_exceptions=False)
+    page = {"accept": "text/html"}
+    assert good in (said := client.get("/runs", headers=page).text) and bad in said
+    assert [run["run"] for run in client.get("/api/runs").json()["runs"]] == [bad, good]
+    shown = client.get(f"/runs/{bad}", headers=page)
+    assert shown.status_code == 200 or (shown.status_code == 422 and "is damaged" in shown.text)
+
+
+def test_what_nobody_foresaw_is_a_page_with_its_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    app = create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data")))
+    client = TestClient(app, base_url="http://127.0.0.1", raise_server_exceptions=False)
+    monkeypatch.setattr("commissioner.service.archive.Archive.entries", lambda *_a, **_k: 1 / 0)
+    page = client.get("/runs", headers={"accept": "text/html"})
+    assert page.status_code == 500 and "The service failed at this" in page.text and 'action="/stop"' in page.text
+    assert page.headers["content-security-policy"] == CSP
+    assert client.get("/api/runs").json()["value"] == "ZeroDivisionError"

@@ -166,3 +166,25 @@ def test_who_sits_here_without_an_account_is_no_english_word_on_the_german_page(
         "otto",
         "operator",
     )
+
+
+def test_what_somebody_called_a_thing_is_no_word_to_translate():
+    german = Texts("de")
+    assert german.tell("there is no motor 'drive'") == "Motor 'drive' gibt es nicht"
+    assert (
+        german.tell("there is no motor 'driv'; did you mean 'drive'?") == "Motor 'driv' gibt es nicht; gemeint 'drive'?"
+    )
+    assert german.seen("there is no motor 'drive'", "drive") == "drive"
+    assert german.seen("the drive does not do this", "fault") == german.tell("fault") != "fault"
+    assert german.short("one of: motor, drive, 2.5") == "eines von: motor, drive, 2.5"
+    assert german.tell("operator operates this drive").startswith("operator ")
+
+
+def test_a_write_that_failed_is_told_whole_in_german():
+    german, back = Texts("de"), "the values held before this write are in the drive again, verified"
+    said = german.tell(f"writing back failed: the drive did not store: the memory failed; {back}")
+    assert "der Speicher hat versagt" in said and "geprüft" in said
+    said = german.tell(f"writing back failed: the drive holds rotor_resistance = 3.2 instead of 3.7; {back}")
+    assert "im Umrichter steht rotor_resistance = 3,2 statt 3,7" in said
+    assert german.short("the memory failed (3)") == "der Speicher hat versagt (3)"
+    assert german.short("at least 3.5") == "mindestens 3,5"
