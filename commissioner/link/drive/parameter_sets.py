@@ -79,7 +79,7 @@ class ParameterSets:
         for name, value in wanted.items():
             if not self.items.same_words(name, seen[name], value):
                 raise DriveFault(
-                    f"the drive holds another {name} than was asked for",
+                    f"the drive holds {name} = {_as_registered(seen[name])} instead of {_as_registered(value)}",
                     step=step,
                     value=seen[name],
                     limit=value,
@@ -89,3 +89,8 @@ class ParameterSets:
     def _read(self, prefix: str) -> dict[str, float]:
         names = [prefix + name for name in self.profile.parameter_names]
         return {name.removeprefix(prefix): number(value) for name, value in self.items.read(names).items()}
+
+
+def _as_registered(value: Value) -> Value:
+    """As many digits as a register of 32 bits tells: 3.2, not 3.200000048."""
+    return float(f"{value:.7g}") if isinstance(value, float) else value
