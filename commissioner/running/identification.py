@@ -34,7 +34,7 @@ from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TMode
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.lack import Lack, lack_of_fit, not_told
-from commissioner.running.nominal import OPEN_INERTIA, with_shaft, with_speed
+from commissioner.running.nominal import OPEN_INERTIA, require_a_motor, with_shaft, with_speed
 
 Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
@@ -90,6 +90,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     start = fit.machine.with_values({"speed_lag": fit.machine.value("speed_lag") - shift})
     of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns)
     by_lag = fit.machine.theta[: len(FOUR)] - of_slope if shift else np.zeros(len(FOUR))
+    require_a_motor(problem, fit)
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
     noise_only = _of_four(fit, fit.covariance())
