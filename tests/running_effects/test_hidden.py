@@ -26,7 +26,7 @@ def test_an_iron_loss_is_in_the_errors_of_the_four(course: str, seed: int) -> No
 
 
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """R_R 97 % low was given without a word: only `diagnose` asked whether the plate's motor may be so."""
+    """Only `diagnose` asked whether the plate's motor may be so."""
     recording, plate, _ = taken(Case(4, "null", "steady").scenario(), 4)
     fitted = identification.refine
 
