@@ -39,6 +39,7 @@ from commissioner.monitor.signals import feeder
 from commissioner.monitor.signals.averaging import Comb, Lines, separate
 from commissioner.monitor.signals.quiet import quietest
 from commissioner.monitor.signals.supply import TurningFrame, turning_frame
+from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate
 from commissioner.records import RunningRecording
@@ -83,12 +84,13 @@ class Observation:
 
 @dataclass(frozen=True)
 class Refused:
-    """No answer, with what was learned on the way; `shaft_hz` where the shaft was seen, and only the periods are too few."""
+    """No answer, with what was learned on the way; `shaft_hz`: the shaft's frequency where it was seen,
+    and only the periods are too few."""
 
     audited: Audited
     reason: Finding
     findings: tuple[Finding, ...]
-    shaft_hz: float | None = None
+    shaft_hz: Quantity | None = None
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,8 @@ def observe(
     trouble = too_little(frame, part, found, search)
     if trouble is not None:
         trouble = volts_per_hertz(audited, plate) or trouble
-        return Refused(audited, trouble, (*audited.findings, trouble), shaft_hz)
+        seen = Quantity(shaft_hz, found.shaft.frequency_std_hz) if found.shaft and shaft_hz is not None else None
+        return Refused(audited, trouble, (*audited.findings, trouble), seen)
     poles = pole_count(found, found.spectrum, plate.pole_pairs, wishes.load_frequencies_hz)
     if poles is not None:
         audited = replace(audited, findings=(*audited.findings, poles))

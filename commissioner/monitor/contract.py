@@ -150,6 +150,7 @@ class PartialMonitoring(TypedDict):
     mean_torque_nm: Measured | None
     parameters: None
     periods: list[LineRow]
+    reference_speed: dict[str, float] | None
     indicators: Indicators
     withheld: dict[str, str]
     trend: TrendDocument | None

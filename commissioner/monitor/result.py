@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, astuple, fields
 from typing import cast
 
@@ -156,6 +156,7 @@ def partial_document(part: Partial, stretches: list[State], audited: Audited) ->
         "mean_torque_nm": None if torque is None else quantity(torque.value, torque.std),
         "parameters": None,
         "periods": [cast("LineRow", asdict(line)) for line in part.lines],
+        "reference_speed": None,
         "indicators": {"supply_frequency_hz": part.supply_hz, **part.indicators, **bands},
         "withheld": dict(part.withheld),
         "trend": None,
@@ -302,11 +303,6 @@ def _spread(
     moved = np.array([values_of(change[0]) for change in solved.changes])
     std = np.sqrt(np.sum((moved - value) ** 2, axis=0))
     return {name: quantity(v, s) for name, v, s in zip(names, value, std, strict=True)}
-
-
-def with_reference(document: MonitoringDocument, comparison: Mapping[str, float]) -> MonitoringDocument:
-    """The document with the encoder's verdict; the encoder was never an input."""
-    return {**document, "reference_speed": dict(comparison)}
 
 
 def _finite(value: float) -> float | None:

@@ -72,6 +72,7 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
 PLATE_KEYS = frozenset((*(one.name for one in fields(Nameplate)), "sample_period_s", "switching_frequency_hz"))
 """Numbers of a recording that stand beside its columns."""
 HEAD_BYTES = 65536
+VECTOR = "three phase voltages or two line-to-line voltages"
 
 
 def read_running(path: Path, mapping: ChannelMap | None = None, motor: str | None = None) -> RunningRecording:
@@ -93,10 +94,15 @@ def require_running(table: Table) -> None:
 
 
 def has_currents_only(table: Table) -> bool:
-    """Whether time and currents are there and no voltage at all."""
-    columns = table.columns
-    currents = sum(f"current_{phase}_a" in columns for phase in "uvw")
-    return "time_s" in columns and currents >= 2 and not any(name.startswith("voltage_") for name in columns)
+    """Whether time and currents are there, and no voltage or too few for a vector."""
+    return "voltage_axis_v" not in table.columns and _missing(table.columns) == [VECTOR]
+
+
+def with_few_voltages_said(table: Table) -> Table:
+    """With a note of the voltages that are there but make no vector, where there are any."""
+    few = [name for name in table.columns if name.startswith("voltage_")]
+    note = ReadingNote(UNUSED_VOLTAGE, f"no voltage vector is made of {', '.join(few)} alone: it takes {VECTOR}")
+    return replace(table, notes=(*table.notes, note)) if few else table
 
 
 def contract_table(path: Path, mapping: ChannelMap | None = None, motor: str | None = None) -> Table:
@@ -115,7 +121,9 @@ def contract_table(path: Path, mapping: ChannelMap | None = None, motor: str | N
 def _without_voltages(table: Table) -> Table:
     """With a note of the columns in volts that could not be used, where there are any."""
     volts = [r for r in table.readings if (unit := read_unit(r.unit)) and unit.measures == "voltage"]
-    empty = [r.name for r in table.readings if (r.meaning or "").startswith("voltage_")]
+    empty = [
+        r.name for r in table.readings if (r.meaning or "").startswith("voltage_") and r.meaning not in table.columns
+    ]
     unnamed = [r.name for r in volts if r.meaning is None]
     why = [f"{', '.join(empty)}: no numbers in the rows of the currents"] if empty else []
     why += [f"{', '.join(unnamed)}: not named by a phase, as Vu, Vv, Vw ({HOW_TO_MAP})"] if unnamed else []
@@ -351,7 +359,7 @@ def _missing(kept: Mapping[str, Signal]) -> list[str]:
         out.append("the currents of phase " + ", ".join(phases))
     star = all(f"voltage_{phase}_v" in kept for phase in "uvw")
     if not star and sum(f"voltage_{pair}_v" in kept for pair in ("uv", "vw", "wu")) < 2:
-        out.append("three phase voltages or two line-to-line voltages")
+        out.append(VECTOR)
     return out
 
 

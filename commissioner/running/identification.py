@@ -24,6 +24,7 @@ from commissioner.estimation.fit import (
     refine,
     simulate,
 )
+from commissioner.estimation.hidden import drawn_aside
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
@@ -33,7 +34,7 @@ from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TMode
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.lack import Lack, lack_of_fit, not_told
-from commissioner.running.nominal import with_shaft, with_speed
+from commissioner.running.nominal import OPEN_INERTIA, require_a_motor, with_shaft, with_speed
 
 Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
@@ -89,18 +90,22 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     start = fit.machine.with_values({"speed_lag": fit.machine.value("speed_lag") - shift})
     of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns)
     by_lag = fit.machine.theta[: len(FOUR)] - of_slope if shift else np.zeros(len(FOUR))
+    require_a_motor(problem, fit)
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
     noise_only = _of_four(fit, fit.covariance())
-    covariance = _of_four(fit, _covariance(problem, fit)) + np.outer(by_lag, by_lag)  # a filter or a counter: not known
+    whole = _covariance(problem, fit)
+    covariance = _of_four(fit, whole) + np.outer(by_lag, by_lag)  # a filter or a counter: not known
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
         raise DataRefused(
             f"the recording says nothing about the {worst}", step="identify", value=float(np.sqrt(covariance.diagonal().max())),
             limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque; one steady load is for `commissioner monitor`",
         )  # fmt: skip
+    aside = drawn_aside(problem, fit)
+    whole, covariance = whole + aside.T @ aside, covariance + _of_four(fit, aside.T @ aside)
     left = lack_of_fit(problem, fit.machine)
-    inertia, load = _shaft(problem, fit, covariance)
+    inertia, load = _shaft(problem, fit, covariance, _inertia_of(fit, whole))
     four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
     bound = {name: quantity.std for name, quantity in _parameters(four, noise_only / fit.scale).items()}
@@ -176,21 +181,31 @@ def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
     return {**out, "rotor_time_constant_s": Quantity(t, float(t * np.sqrt(max(spread, 0.0))))}
 
 
-def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | None, dict[str, float]]:
+def _inertia_of(fit: Fit, whole: Array) -> Quantity | None:
+    """Where the shaft is in the fit and its inertia free and told; `whole`: covariance of the columns' numbers."""
+    if INERTIA not in fit.columns:
+        return None
+    place, value = fit.place("inertia"), fit.machine.value("inertia")
+    std = float(np.sqrt(whole[place, place]))
+    return Quantity(value, value * std) if std < OPEN_INERTIA else None
+
+
+def _shaft(
+    problem: Problem, fit: Fit, covariance: Array, fitted: Quantity | None
+) -> tuple[Quantity | None, dict[str, float]]:
     """Inertia and load of a start: from the fit where the shaft is in it, else from torque against measured speed. Without a start the
     inertia alone, where a load that moves tells it."""
     record = problem.record
     torque = record.scales.torque_nm
     if not record.has_start:
-        told = INERTIA in fit.columns
-        return (Quantity(fit.machine.value("inertia"), fit.std("inertia")) if told else None), {}
+        return fitted, {}
     if fit.machine.has_shaft:
         load = {
             "constant_nm": fit.machine.value("load_constant") * torque,
             "linear_at_synchronous_nm": fit.machine.value("load_linear") * torque,
             "fan_at_synchronous_nm": fit.machine.value("load_fan") * torque,
         }
-        return Quantity(fit.machine.value("inertia"), fit.std("inertia")), load
+        return fitted, load
     own = _inertia(problem, fit.machine)
     if own is None:
         return None, {}

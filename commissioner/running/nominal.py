@@ -70,7 +70,13 @@ def nominal(problem: Problem) -> tuple[Problem, Fit]:
     problem, fit = weighted(problem, fit)
     if not record.has_speed:
         fit = _with_load_changes(problem, fit)
-    four = prior(record.plate).typical.as_tuple()
+    require_a_motor(problem, fit)
+    return problem, fit
+
+
+def require_a_motor(problem: Problem, fit: Fit) -> None:
+    """DataRefused where nothing was fitted, or what was is no motor of this plate."""
+    four = prior(problem.record.plate).typical.as_tuple()
     off = [abs(np.log(fit.machine.value(n) / v)) for n, v in zip(FOUR, four, strict=True)]
     if fit.chi2 / fit.count > LEAST_CHI2 * 100 or max(off) > np.log(MOST_OFF):
         worst = FOUR[int(np.argmax(off))]
@@ -79,7 +85,6 @@ def nominal(problem: Problem) -> tuple[Problem, Fit]:
             step="fit of four parameters", value=fit.machine.value(worst), limit=f"within {MOST_OFF:g} times {dict(zip(FOUR, four, strict=True))[worst]:.3g}",
             remedy="check the scale and the phase order of currents and voltages, and the plate",
         )  # fmt: skip
-    return problem, fit
 
 
 def weighted(problem: Problem, fit: Fit) -> tuple[Problem, Fit]:

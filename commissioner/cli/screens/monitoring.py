@@ -48,6 +48,7 @@ def show_partial(document: Mapping[str, Any]) -> None:
     ):
         if document[key] is not None:
             rows.append((label, quantity(document[key]["value"] * scale, document[key]["std"] * scale, unit)))
+    rows += _beside(document)
     rows += [(name.replace("_", " "), _indicated(value)) for name, value in document["indicators"].items()]
     rows += [("modulates the current", f"{line['frequency_hz']:.4f} Hz") for line in document["periods"]]
     out.print(table("A partial answer", ("", ""), rows))
@@ -62,6 +63,19 @@ def show_partial(document: Mapping[str, Any]) -> None:
         out.print(
             f"{document['trend']['sentence']}: {', '.join(in_words(name)[0] for name in document['trend']['alarms']) or 'no alarm'}"
         )
+
+
+def _beside(document: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the speed column beside it reads, and how far the terminals' answer is from it in its own standard deviations."""
+    r = document["reference_speed"]
+    if not r:
+        return []
+    said = f"{r['mean_speed_rad_per_s'] * RPM:.6g} 1/min"
+    for what, of, name in (("ours", "mean_speed", ""), ("ripple", "ripple", " of its rms")):
+        if f"{of}_error_in_std" in r:
+            off = f"{abs(r[f'{of}_error_in_std']):.2g} standard deviations ({abs(r[f'{of}_relative_error']):.2g}{name})"
+            said += f"; {what} off by {off}"
+    return [("speed column (not used)", said)]
 
 
 def _indicated(value: float | bool | Mapping[str, float]) -> str:
@@ -95,7 +109,7 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
     wiring = miswired(seen.findings)
     for finding in wiring:
         out.print(f"[bold yellow]check the probes:[/] {text(finding.what, SENTENCE)} (put right here)")
-    out.print(table("", ("", "± is 95 %"), _shaft(seen, document["waveforms"])))
+    out.print(table("", ("", "± is 95 %"), _shaft(seen, document["waveforms"]) + _beside(document)))
     _load_periods(seen)
     _motor(seen, document["parameters"])
     out.print(document["cannot_be_fixed"]["sentence"])

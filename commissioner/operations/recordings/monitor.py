@@ -18,17 +18,16 @@ from commissioner.monitor.result import (
     partial_document,
     refused_document,
     verdict_document,
-    with_reference,
 )
 from commissioner.monitor.trend.indicators import pulses, trendable
-from commissioner.monitor.trend.reference import against_encoder
+from commissioner.monitor.trend.reference import against_encoder, beside_column
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.ranges import require_range
 from commissioner.operations.recordings.stretches import as_state, in_its_states, longest_steady, said_by_terminals
 from commissioner.operations.recordings.trust import trust_from
 from commissioner.recordings.baseline import update
-from commissioner.recordings.importers import contract_table, has_currents_only, require_running
+from commissioner.recordings.importers import contract_table, has_currents_only, require_running, with_few_voltages_said
 from commissioner.recordings.plate import has_no_plate, plate_of, start_from
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table, to_currents, to_running
@@ -98,7 +97,7 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | P
     _require_possible(request)
     table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None, request.motor)
     if has_currents_only(table):
-        return _of_currents(table, request, observe)
+        return _of_currents(with_few_voltages_said(table), request, observe)
     require_running(table)
     recording = to_running(table)
     for hz in request.load_hz:
@@ -109,11 +108,14 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | P
     start = start_from(request.start) if request.start else None
     observe(Began("looking for speed and load"))
     wishes = Wishes(request.load_hz, request.inertia_kg_m2, start, trust=trust_from(request.trust))
-    seen, recording, stretches = in_its_states(recording, plate, wishes)
+    whole = recording
+    seen, recording, stretches = in_its_states(whole, plate, wishes)
     if isinstance(seen, Refused):
         part = said_by_terminals(seen, stretches, plate)
         if part is not None:
-            return PartlyMonitored(partial_document(part, stretches, seen.audited))
+            document_of_part = partial_document(part, stretches, seen.audited)
+            document_of_part["reference_speed"] = beside_column(whole, stretches, part.speed_rad_per_s)
+            return PartlyMonitored(document_of_part)
         return _refused(seen, request.file, stretches)
     made = pulses(seen)
     indicators = trendable(seen, made)
@@ -122,9 +124,7 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | P
         verdict, history = update(request.baseline, entry_of(seen, indicators, str(request.file)), request.learn)
     document = as_document(seen, made, indicators, verdict)
     document["states"] = stretches
-    comparison = against_encoder(seen, recording)
-    if comparison is not None:
-        document = with_reference(document, comparison)
+    document["reference_speed"] = against_encoder(seen, recording)
     if request.out is not None:
         from commissioner.recordings.monitored import write_results
         from commissioner.report.monitoring.page import page_of
@@ -164,6 +164,7 @@ def _partly(
         audited = refused_audit(recording, seen)
         return _refused(Refused(audited, seen, audited.findings), request.file, stretches)
     document = partial_document(seen, stretches, refused_audit(recording, None))
+    document["reference_speed"] = beside_column(recording, stretches, seen.speed_rad_per_s)
     if request.baseline is not None:
         entry = entry_of_part(seen, str(request.file))
         if entry is None:

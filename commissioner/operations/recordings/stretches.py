@@ -15,7 +15,7 @@ from commissioner.monitor.intake.channels import Wiring, is_straight_motor
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.intake.states.naming import LEAST_STEADY_S, START_CURRENT
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
-from commissioner.monitor.intake.terminals import from_terminals, power_wander_w
+from commissioner.monitor.intake.terminals import Terminals, from_terminals, power_wander_w
 from commissioner.monitor.loads.pairing_by_start import wired_in
 from commissioner.monitor.partial import OF_MODEL, Partial, of_terminals, refused_audit
 from commissioner.monitor.periods.periods import slip_of
@@ -29,6 +29,8 @@ SILENT = frozenset({"no_period", "no_shaft_line"})
 """Refusals of a stretch that is steady, but too even for the shaft to be seen: a fan, a pump, a healthy coupling."""
 MARGIN_S = 0.06
 """At either end of a steady stretch: the window that finds it reaches so far over its edge."""
+AGREES = 3.0
+"""Standard deviations of the terminals' speed within which a line is the shaft's."""
 
 
 def in_its_states(
@@ -116,7 +118,8 @@ def _watched(part: RunningRecording, plate: Nameplate, wishes: Wishes) -> Observ
         return seen
     against, said = against_plate(seen.audited, None, plate), doubt_of(seen.audited, None, plate)
     if against is not None and seen.shaft_hz is not None:
-        against, said = against_plate(seen.audited, seen.shaft_hz, plate), doubt_of(seen.audited, seen.shaft_hz, plate)
+        shaft_hz = seen.shaft_hz.value
+        against, said = against_plate(seen.audited, shaft_hz, plate), doubt_of(seen.audited, shaft_hz, plate)
     if against is not None:
         if wishes.trust == "plate" and against.likely is not None:
             return observe(over_currents(part, against.likely), plate, replace(wishes, trust=None))
@@ -139,8 +142,23 @@ def _add_own(state: State, seen: Observation | Refused, plate: Nameplate) -> Non
         return
     terminal = from_terminals(seen.audited.fundamental, plate, power_wander_w(seen.audited))
     if terminal is not None:
-        state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
+        speed = _by_shaft(seen, terminal, plate)
+        state["mean_speed_rad_per_s"] = {"value": speed.value, "std": speed.std}
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
+        if speed.value != terminal.speed_rad_per_s:
+            state["withheld"] = f"torque {state['withheld']}"
+
+
+def _by_shaft(seen: Refused, terminal: Terminals, plate: Nameplate) -> Quantity:
+    """The speed of the shaft's line where it is seen and agrees with the terminals' and the plate's slip, else that slip's. A load that moves
+    moves the slip with it: the line is that of the quietest part."""
+    by_slip, f = Quantity(terminal.speed_rad_per_s, terminal.speed_std_rad_per_s), seen.audited.fundamental
+    if seen.shaft_hz is None or f is None:
+        return by_slip
+    shaft, std = 2 * np.pi * seen.shaft_hz.value, 2 * np.pi * seen.shaft_hz.std
+    drop = 2 * np.pi * f.frequency_hz / plate.pole_pairs - shaft
+    std = float(np.hypot(std, drop * power_wander_w(seen.audited) / abs(f.power_w)))
+    return Quantity(shaft, std) if abs(shaft - by_slip.value) < AGREES * by_slip.std and std < by_slip.std else by_slip
 
 
 def longest_steady(

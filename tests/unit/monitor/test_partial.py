@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commissioner.cli.screens.monitoring import show_partial
 from commissioner.errors import ConfigurationError
 from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.periods.periods import beside_multiple, pair_spectrum
@@ -257,3 +258,36 @@ def test_the_distance_to_the_nearest_multiple(frequency_hz: float) -> None:
     multiples = 50.0 * np.arange(5)
     assert beside_multiple(frequency_hz, 50.0) == np.abs(frequency_hz - multiples).min()
     assert beside_multiple(frequency_hz, 50.0, first=1) == np.abs(frequency_hz - multiples[1:]).min()
+
+
+@pytest.mark.parametrize("kept", ["u", "uv"])
+def test_voltages_too_few_for_a_vector_leave_what_the_currents_tell(tmp_path: Path, kept: str) -> None:
+    made = columns(volts=True)
+    few = {n: x for n, x in made.items() if not n.startswith("voltage_") or n[8] in kept}
+    document = watched(tmp_path, few, PLATE).document
+    assert document["mean_speed_rad_per_s"]["value"] == pytest.approx(2 * np.pi * SHAFT_HZ, abs=0.1)
+    assert f"voltage_{kept[-1]}_v alone" in document["withheld"]["mean_torque_nm"]
+
+
+@pytest.mark.parametrize(("made", "plate"), [(even, PLATE), (columns, PLATE), (columns, {})])
+def test_a_speed_column_beside_a_partial_answer_is_compared_with_it(tmp_path: Path, made, plate) -> None:
+    """No line of the shaft, no voltages, no plate: what the column reads had been passed over."""
+    table = made()
+    table["speed_rad_per_s"] = np.full(table["time_s"].size, 2 * np.pi * SHAFT_HZ)
+    document = watched(tmp_path, table, plate).document
+    beside, own = document["reference_speed"], document["mean_speed_rad_per_s"]
+    assert beside["mean_speed_rad_per_s"] == pytest.approx(2 * np.pi * SHAFT_HZ)
+    assert own is None or beside["mean_speed_error_in_std"] == pytest.approx(
+        (own["value"] - 2 * np.pi * SHAFT_HZ) / own["std"], rel=1e-3
+    )
+    show_partial(document)
+
+
+def test_a_shaft_that_is_seen_tells_the_speed_where_a_slow_load_has_too_few_periods(tmp_path: Path) -> None:
+    made = columns(volts=True)
+    for p in "uvw":
+        made[f"current_{p}_a"] *= 1 + 0.01 * np.cos(2 * np.pi * 0.7 * made["time_s"])
+    document = watched(tmp_path, made, PLATE).document
+    speed = document["mean_speed_rad_per_s"]
+    assert "too few to tell a period" in document["withheld"]["waveforms"]
+    assert speed["std"] < 0.1 and speed["value"] == pytest.approx(2 * np.pi * SHAFT_HZ, abs=3 * speed["std"])

@@ -1,0 +1,39 @@
+"""What every motor has and a steady load hides: the stated errors hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from commissioner.errors import DataRefused
+from commissioner.estimation.fit import Column, Fit, Machine, Problem
+from commissioner.running import identification
+from commissioner.running.identification import identify
+from tests.running_effects.cases import Case, taken
+
+
+@pytest.mark.parametrize("course", ["steady", "start"])
+@pytest.mark.parametrize("seed", [4, 5])
+def test_an_iron_loss_is_in_the_errors_of_the_four(course: str, seed: int) -> None:
+    """Under one steady load the residual is white, and R_R had been 200 of its stated errors off."""
+    recording, plate, truth = taken(Case(seed, "one", course, only="iron_loss").scenario(), seed)
+    found = identify([recording], plate)
+    for name, value in truth["inverse_gamma"].items():
+        own = found.parameters[name]
+        assert abs(own.value - value) < 3.0 * own.std, (name, own, value)
+
+
+def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only `diagnose` asked whether the plate's motor may be so."""
+    recording, plate, _ = taken(Case(4, "null", "steady").scenario(), 4)
+    fitted = identification.refine
+
+    def astray(problem: Problem, machine: Machine, columns: Sequence[Column], **wishes: bool) -> Fit:
+        fit = fitted(problem, machine, columns, **wishes)
+        return replace(fit, machine=fit.machine.with_values({"rotor_resistance": 1e-5}))
+
+    monkeypatch.setattr(identification, "refine", astray)
+    with pytest.raises(DataRefused, match="rotor resistance"):
+        identify([recording], plate)
