@@ -12,7 +12,7 @@ import typer
 from typer.exceptions import TyperException
 
 from commissioner.cli.signals import be_deaf, listen
-from commissioner.errors import OF_DISK, Aborted, CommissionerError, DataRefused, UsageError
+from commissioner.errors import OF_DISK, Aborted, CommissionerError, DataRefused, DiskRefused, UsageError
 from commissioner.link.wire.secrets import Secrets, shown_call
 
 NO_ARGUMENTS = "NoArgsIsHelpError"
@@ -109,8 +109,8 @@ def _unanswered(arguments: Sequence[str]) -> CommissionerError:
 
 def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:
     """A file or folder that is in the way, closed to us, or on a disk that is full or failing."""
-    kind = CommissionerError if failure.errno in OF_DISK else UsageError
-    remedy = "make room on the disk, or use another one" if kind is CommissionerError else "give another file or folder"
+    kind = DiskRefused if failure.errno in OF_DISK else UsageError
+    remedy = "make room on the disk, or use another one" if kind is DiskRefused else "give another file or folder"
     return kind(
         f"{failure.filename or 'a file'} cannot be used: {failure.strerror or failure}", step=_verb(arguments),
         value=failure.filename or shown_call(arguments), limit="a file or folder that this user may read or write", remedy=remedy,

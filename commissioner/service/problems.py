@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
-from commissioner.errors import NOTHING, Aborted, CommissionerError, DataRefused, DriveError, UsageError
+from commissioner.errors import NOTHING, OF_DISK, Aborted, CommissionerError, DataRefused, DriveError, UsageError
 from commissioner.validation import wanted
 
 MEDIA_TYPE = "application/problem+json"
@@ -89,7 +89,7 @@ def surprise(error: Exception) -> Refusal:
     )  # fmt: skip
 
 
-FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+FULL = OF_DISK - {errno.EROFS, errno.EIO}
 FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
 GONE = {errno.ENOENT, errno.ENOTDIR}
 

@@ -10,6 +10,8 @@ from pathlib import Path
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.run.archive.summary import RunSummary, read_summary, sound_result, summarise, unreadable
 
+DIGITS = tuple("0123456789")
+
 
 def read_runs(root: Path, *, with_results: bool = True) -> list[RunSummary]:
     """Newest first; empty where there is no archive. A folder that cannot be read is a row that says so."""
@@ -34,7 +36,16 @@ def find_run(root: Path, name: str) -> RunSummary:
 
 def run_folders(root: Path) -> list[Path]:
     """Every folder of a run, newest first, also one whose journal is gone; none where there is no archive."""
-    return sorted((path for path in root.iterdir() if _is_run(path)), reverse=True) if root.is_dir() else []
+    return (
+        sorted((p for p in root.iterdir() if _is_run(p)), key=lambda p: age(p.name), reverse=True)
+        if root.is_dir()
+        else []
+    )
+
+
+def age(name: str) -> tuple[bool, str]:
+    """By which runs are ordered: an id begins with its time; a folder that somebody called otherwise is never the newest."""
+    return name[:1] in DIGITS, name
 
 
 def must_be_archive(root: Path) -> None:
@@ -49,7 +60,7 @@ def must_be_archive(root: Path) -> None:
 def find_folder(root: Path, name: str) -> Path:
     """As `find_run`, its folder; also by the path that a shell completes, `runs/ID/`. UsageError: none or several."""
     given, name = name, _id_of(root, name)
-    names = sorted(os.listdir(root), reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
+    names = sorted(os.listdir(root), key=age, reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
     if name == "last":
         matching = list(itertools.islice(filter(_is_run, (root / one for one in names)), 1))
     else:

@@ -67,7 +67,7 @@ def test_a_stop_reaches_a_run_whose_process_is_not_there_yet(parts):
     assert begin(parts, ("anna",), stop=("bert", "wait")) == ["stopped by [('bert', 'wait')]"]
 
 
-@pytest.mark.parametrize(("step", "status"), [("take the drive", 409), ("read the drive", 502)])
-def test_a_drive_that_another_process_holds_is_a_conflict_and_no_broken_drive(tmp_path, step, status):
-    refusal = child._refusal(5, {"error": {"what": "the drive is in use", "step": step}}, tmp_path / "log")
+@pytest.mark.parametrize(("kind", "status"), [("DriveInUse", 409), ("DiskRefused", 507), ("LinkUnreachable", 502)])
+def test_a_drive_in_use_or_a_full_disk_is_no_broken_drive(tmp_path, kind, status):
+    refusal = child._refusal(5, {"error": {"kind": kind, "what": "no run"}}, tmp_path / "log")
     assert refusal.problem.status == status
