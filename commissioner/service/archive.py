@@ -83,7 +83,12 @@ class Archive:
     def result(self, run: str) -> JsonObject | RunWithoutResult:
         """The result document; of a run without one, what its journal says. DataRefused: it is damaged."""
         entry = self.find(run)
-        return read_result(entry.folder) or {
+        if (found := read_result(entry.folder)) is not None:
+            return {
+                **found,
+                "run": entry.run,
+            }  # the folder may have been renamed: its name is what the archive calls it
+        return {
             "run": entry.run,
             "outcome": entry.outcome,
             "reason": entry.reason,

@@ -62,7 +62,7 @@ def find_folder(root: Path, name: str) -> Path:
     given, name = name, _id_of(root, name)
     names = sorted(os.listdir(root), key=age, reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
     if name == "last":
-        matching = list(itertools.islice(filter(_is_run, (root / one for one in names)), 1))
+        matching = list(itertools.islice(filter(_has_journal, (root / one for one in names)), 1))
     else:
         matching = [root / one for one in names if one.startswith(name) and _is_run(root / one)]
     exact = [path for path in matching if path.name == name] or matching
@@ -92,6 +92,14 @@ def _id_of(root: Path, name: str) -> str:
     """The folder's name alone, of a path into this archive; any other path is none of its runs, whatever lies there."""
     path = Path(name)
     return path.name if path.name != name and os.path.abspath(path.parent) == os.path.abspath(root) else name  # noqa: PTH100  touches no disk
+
+
+def _has_journal(path: Path) -> bool:
+    """A run that lists show: one whose journal is gone is found by its name alone."""
+    try:
+        return (path / "journal.jsonl").is_file()
+    except OSError:
+        return False
 
 
 def _is_run(path: Path) -> bool:
