@@ -26,11 +26,13 @@ PAGE = PRODUCT / "service" / "page"
 SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py", "run/inspection.py",
         "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py", "service/library.py", "service/recordings.py", "service/simulator.py", "operations/history/runs.py", "run/ending.py", "run/archive/documents.py", "run/write_accepted.py", "run/restore.py", "run/holding", "run/tuning",
-        "link/drive", "procedure/tuned.py")  # fmt: skip
+        "link/drive", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
 FACTS = ("what", "title", "remedy")
-NOT_SHOWN = re.compile(r"^there is no 7 7$|POST /api|choose one of these$|^7 in the drive$|nameplate7$|^7 is 7$|^$")
-"""Of scripts alone; and the drive's plate, whose checks have a name for each of its keys."""
+NOT_SHOWN = re.compile(
+    r"^there is no 7 7$|POST /api|choose one of these$|^7 in the drive$|nameplate7$|^7 is 7$|^7: 7$|^$"
+)
+"""Of scripts alone; a file's name before a sentence that stands elsewhere; and the drive's plate, whose checks have a name for each of its keys."""
 
 
 @pytest.fixture(scope="module")

@@ -206,3 +206,9 @@ def test_why_the_service_stopped_a_run_is_told_in_german_and_a_persons_words_sta
     assert german.why("service", reason) not in ("", reason)
     assert german.why("anna", reason) == reason
     assert german.person("service") == "Dienst"
+
+
+@pytest.mark.parametrize("name", ["leer.csv", "my-file.csv", "20261129-082711-x", "hall3"])
+def test_a_file_or_an_id_that_begins_a_sentence_keeps_its_letters(name):
+    said = Words(Texts("de")).sentence(f"{name}: the file is empty")
+    assert said == f"{name}: Die Datei ist leer"
