@@ -117,6 +117,14 @@ def core_sentences():
             yield from ((path.name, text) for text in found if " " in text and not NOT_SHOWN.search(text))
 
 
+def of_tables():
+    """What the table of a recording is refused for, behind the file's name, and what to do."""
+    for node in ast.walk(ast.parse((PRODUCT / "recordings/table.py").read_text("utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "_refuse":
+            yield from (f"7: {text}" for text in shown(node.args[1]))
+            yield from shown(node.args[-1])
+
+
 def of_tunings():
     """What the drive files say to whoever stands at the drive, and what is said of every tuning."""
     for name in known_drives():
@@ -148,6 +156,12 @@ def test_every_sentence_of_checks_guards_and_refusals_has_its_translation():
         {f"{place}: {text}" for place, text in core_sentences() if not german.knows(text.removesuffix(", degC"))}
     )
     assert missing == []
+
+
+def test_what_a_recordings_table_is_refused_for_has_its_translation():
+    german, told = Texts("de"), set(of_tables())
+    assert len(told) > 30
+    assert sorted(text for text in told if not german.knows(text)) == []
 
 
 def test_what_to_do_about_each_refused_request_has_its_translation():
