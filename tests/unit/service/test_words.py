@@ -1,5 +1,6 @@
 """Sizes of causes as the page writes them."""
 
+import re
 from importlib.resources import files
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from commissioner.procedure.states import ENDED, State
 from commissioner.procedure.tuned import FEWEST
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.report.sheet.words import NBSP
+from commissioner.run.archive import summary
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import IN_THE_DRIVE, Words
@@ -206,6 +208,24 @@ def test_why_the_service_stopped_a_run_is_told_in_german_and_a_persons_words_sta
     assert german.why("service", reason) not in ("", reason)
     assert german.why("anna", reason) == reason
     assert german.person("service") == "Dienst"
+
+
+@pytest.mark.parametrize("kind", ["parameters_written", "snapshot_restored", "about_to"])
+@pytest.mark.parametrize("facts", [{}, {"is_stored": False}, {"store_count_after": 3, "endurance_writes": 100000}, {"is_stored": False, "store_count_after": 3, "endurance_writes": 9}])  # fmt: skip
+def test_what_a_drive_holds_after_a_run_is_told_in_german(kind, facts):
+    """Above all of a run that was cut off while it wrote."""
+    said = summary._written([{"kind": kind, "record": facts | {"action": "commit"}}])
+    german = Texts("de").tell(said)
+    assert not set(re.findall(r"[a-z]{3,}", german)) & {
+        "new",
+        "old",
+        "read",
+        "stored",
+        "before",
+        "drive",
+        "used",
+        "writes",
+    }
 
 
 @pytest.mark.parametrize("name", ["leer.csv", "my-file.csv", "20261129-082711-x", "hall3"])
