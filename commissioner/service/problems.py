@@ -96,7 +96,11 @@ GONE = {errno.ENOENT, errno.ENOTDIR}
 
 def disk_refuses(failure: OSError) -> Refusal:
     """What needs an entry on the disk is not done without one: what the disk says is told, with what mends it."""
-    seen = {"detail": str(failure)[:200], "step": "write down", "value": failure.strerror or str(failure)[:200]}
+    seen: dict[str, Any] = {
+        "detail": str(failure)[:200],
+        "step": "write down",
+        "value": failure.strerror or str(failure)[:200],
+    }
     if failure.errno == errno.ENAMETOOLONG:
         name = Path(str(failure.filename)).name
         return Refusal(
