@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import ConfigurationError, UsageError
@@ -63,6 +63,17 @@ class MotorFile(FileTable):
         Field(description="as it is wired: star (Y, wye) or delta (D, triangle)"),
     ] = "star"
     inertia_kg_m2: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+
+
+def _testable(axis_deg: float) -> float:
+    if is_aslant(axis_deg):
+        raise ValueError(_TESTABLE)
+    return axis_deg
+
+
+_TESTABLE = f"multiples of {LEGS_ALIKE_DEG:g} deg: beside them the losses of the inverter's legs drive a current across the axis, and all values are off"
+TestAngle = Annotated[float, Field(ge=-360, le=360), AfterValidator(_testable)]
+"""An axis (electrical degrees) of a run to be. Earlier runs may hold another."""
 
 
 class _Axes(FileTable):
@@ -155,8 +166,7 @@ def require_possible(plan: ProcedurePlan, source: str) -> None:
             f"axis {axis_deg:g} deg cannot be tested",
             step="read configuration",
             value=f"{axis_deg:g} deg",
-            limit=f"multiples of {LEGS_ALIKE_DEG:g} deg: beside them the losses of the inverter's legs drive a current across the axis, "
-            "and all values are off",
+            limit=_TESTABLE,
             remedy="test axes such as 0, 60 and 120 deg",
         )
     if plan.limits.total_time_s < plan.total_seconds:

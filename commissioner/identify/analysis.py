@@ -309,7 +309,7 @@ def axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
 def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, reached_wb: float) -> list[str]:
     remarks = [
         f"axis {r.axis_deg:g} deg is no multiple of {LEGS_ALIKE_DEG:g} deg: what the inverter's legs lose drives a current beside it; standard "
-        "errors are widened for it"
+        "errors are widened for it, `commissioner diagnose` knows it"
         for r in results
         if is_aslant(r.axis_deg) and r.batch.model.leg is not None
     ]

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import Field
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.settings import load
+from commissioner.settings import TestAngle, load
 from commissioner.validation import FileTable
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,39}$")]
@@ -47,7 +47,7 @@ class ServiceTable(FileTable):
     hand_over_s: Annotated[float, Field(ge=1, le=600)] = 15.0
     session_idle_s: Annotated[float, Field(ge=1, le=86400)] = 1800.0
     diagnosis: bool = True
-    axes_deg: list[Annotated[float, Field(ge=0, lt=360)]] = Field(default=[])
+    axes_deg: list[TestAngle] = Field(default=[])
     """Of runs from the page, in electrical degrees; none: the procedure's own."""
 
 

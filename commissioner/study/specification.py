@@ -12,7 +12,7 @@ from pydantic import Field
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import Nameplate
-from commissioner.settings import is_plate, load_motor
+from commissioner.settings import TestAngle, is_plate, load_motor
 from commissioner.validation import FileTable
 
 MOST_CASES = 1_000_000
@@ -29,9 +29,7 @@ class Specification(FileTable):
     noise_a: Annotated[float, Field(ge=0, le=100, description="amperes rms, 0 ... 100")] | None = None
     links: Literal["memory", "tcp"] = "memory"
     faults: list[str] = Field(default=[])
-    axes_deg: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=12)] | None = (
-        None
-    )
+    axes_deg: Annotated[list[TestAngle], Field(min_length=1, max_length=12)] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
     files: str = ""
 

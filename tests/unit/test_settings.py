@@ -3,13 +3,17 @@
 import tomllib
 
 import pytest
+from pydantic import ValidationError
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.link.files.drive_file import load_profile
 from commissioner.recordings.plate import plate_of
 from commissioner.recordings.reading.mapping import read_mapping
+from commissioner.service.configuration import ServiceFile
+from commissioner.service.routes.runs import RunWish
 from commissioner.settings import CONFIG_FOLDER, load_motor, load_procedure
+from commissioner.study.specification import Specification
 
 PLATE = (CONFIG_FOLDER / "motors" / "motor_2kw2.toml").read_text()
 
@@ -277,6 +281,19 @@ def test_an_axis_beside_which_the_legs_drive_a_current_is_refused_before_anythin
         load_procedure(axes_deg=(0.0, axis_deg))
     assert (caught.value.exit_code, caught.value.value) == (2, f"{axis_deg:g} deg")
     assert "multiples of 30 deg" in str(caught.value.limit)
+
+
+@pytest.mark.parametrize(
+    ("model", "table"),
+    [
+        (Specification, {"kind": "commission", "axes_deg": [0, 45]}),
+        (ServiceFile, {"service": {"axes_deg": [45]}}),
+        (RunWish, {"drive": "d", "motor": "m", "confirm": True, "axes_deg": [17]}),
+    ],
+)
+def test_so_do_the_files_and_requests_that_runs_are_made_of(model, table):
+    with pytest.raises(ValidationError, match="multiples of 30 deg"):
+        model.model_validate(table)
 
 
 def test_every_axis_on_which_the_legs_are_alike_is_taken():

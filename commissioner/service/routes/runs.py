@@ -20,9 +20,9 @@ from commissioner.service.parts import Parts
 from commissioner.service.runs.child import ask_for, succeed
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.live import live_document
+from commissioner.settings import TestAngle
 
 router = APIRouter(route_class=Typed)
-Angle = Annotated[float, Field(ge=-360, le=360)]
 USUAL = 100
 Given = BeforeValidator(lambda value: value or USUAL)
 """A filter that a form left empty is none."""
@@ -34,7 +34,7 @@ class RunWish(BaseModel):
     model_config = ConfigDict(extra="forbid")
     drive: Annotated[str, Field(max_length=60)]
     motor: Annotated[str, Field(max_length=60)]
-    axes_deg: Annotated[list[Angle], Field(max_length=12)] = []
+    axes_deg: Annotated[list[TestAngle], Field(max_length=12)] = []
     write_back: bool = False
     procedure: Annotated[str, Field(max_length=60)] = STANDARD
     confirm: Literal[True]

@@ -86,13 +86,14 @@ def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(
 
 def test_a_page_that_has_lost_the_service_says_what_it_cannot_do(browser, tmp_path):
     """The service is killed: zero volts by the dead man; the page points at the emergency stop."""
-    with ServiceProcess(tmp_path) as service, technician(browser, service) as hand:
+    with ServiceProcess(tmp_path, speed="1.0") as service, technician(browser, service) as hand:
         service.start_simulator()
         # a service's first page costs most: on a busy host a run heard nothing of it for two seconds
         hand.go("/drives/simulator")
         run = service.start_run()
         hand.go(f"/runs/{run}")
         hand.wait_energised()
+        service.wait_just_energised(run)
         began = time.time()
         service.kill()
         assert service.wait_dead(began) <= ZERO_VOLTS_S
