@@ -84,6 +84,10 @@ class CommissionerError(Exception):
         return document | {"unit": self.unit} if self.unit else document
 
 
+class DiskRefused(CommissionerError):
+    """The disk is full, or fails."""
+
+
 class UsageError(CommissionerError):
     exit_code = 2
     outcome = "usage"

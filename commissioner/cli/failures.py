@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 import tempfile
 import traceback
@@ -12,7 +13,7 @@ import typer
 from typer.exceptions import TyperException
 
 from commissioner.cli.signals import be_deaf, listen
-from commissioner.errors import OF_DISK, Aborted, CommissionerError, DataRefused, UsageError
+from commissioner.errors import OF_DISK, Aborted, CommissionerError, DataRefused, DiskRefused, UsageError
 from commissioner.link.wire.secrets import Secrets, shown_call
 
 NO_ARGUMENTS = "NoArgsIsHelpError"
@@ -109,8 +110,9 @@ def _unanswered(arguments: Sequence[str]) -> CommissionerError:
 
 def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:
     """A file or folder that is in the way, closed to us, or on a disk that is full or failing."""
-    kind = CommissionerError if failure.errno in OF_DISK else UsageError
-    remedy = "make room on the disk, or use another one" if kind is CommissionerError else "give another file or folder"
+    kind = DiskRefused if failure.errno in OF_DISK else UsageError
+    has_room = kind is UsageError or failure.errno == errno.EROFS
+    remedy = "give another file or folder" if has_room else "make room on the disk, or use another one"
     return kind(
         f"{failure.filename or 'a file'} cannot be used: {failure.strerror or failure}", step=_verb(arguments),
         value=failure.filename or shown_call(arguments), limit="a file or folder that this user may read or write", remedy=remedy,

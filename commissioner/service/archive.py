@@ -11,7 +11,7 @@ from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
 from commissioner.operations.history.runs import must_be_findable
-from commissioner.run.archive.catalogue import read_run
+from commissioner.run.archive.catalogue import age, read_run
 from commissioner.run.archive.documents import identified, origin_of, read_document, read_result
 from commissioner.run.archive.summary import AS_BEFORE
 from commissioner.run.index.rows import Wanted, utc_of
@@ -83,7 +83,12 @@ class Archive:
     def result(self, run: str) -> JsonObject | RunWithoutResult:
         """The result document; of a run without one, what its journal says. DataRefused: it is damaged."""
         entry = self.find(run)
-        return read_result(entry.folder) or {
+        if (found := read_result(entry.folder)) is not None:
+            return {
+                **found,
+                "run": entry.run,
+            }  # the folder may have been renamed: its name is what the archive calls it
+        return {
             "run": entry.run,
             "outcome": entry.outcome,
             "reason": entry.reason,
@@ -115,7 +120,7 @@ class Archive:
     def _names(self) -> list[str]:
         try:
             with os.scandir(self.root) as entries:
-                return sorted((e.name for e in entries if _is_name(e.name)), reverse=True)
+                return sorted((e.name for e in entries if _is_name(e.name)), key=age, reverse=True)
         except OSError:
             return []
 

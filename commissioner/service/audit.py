@@ -9,6 +9,7 @@ import os
 import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -51,10 +52,7 @@ class Audit:
             entry = {"n": self._number, "utc": when, "person": person, "from": address, "what": what, **facts}
             digest = _digest(self._head, entry)
             line = json.dumps(entry | {"before": self._head, "hash": digest}, ensure_ascii=False) + "\n"
-            with Path(self._path).open("a", encoding="utf-8") as file:
-                file.write(line)
-                file.flush()
-                os.fsync(file.fileno())
+            _append(self._path, line)
             self._number, self._head = self._number + 1, digest
 
     def newest(self, limit: int) -> list[AuditEntry]:
@@ -76,6 +74,20 @@ def verify(path: Path) -> Chain:
             broken = count
         head, count = str(said), count + 1
     return Chain(count, head, broken)
+
+
+def _append(path: Path, line: str) -> None:
+    """The line, on the disk. OSError: nothing of it is there; half a line would spoil the next one."""
+    before = path.stat().st_size if path.is_file() else 0
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError:
+        with suppress(OSError):
+            os.truncate(path, before)
+        raise
 
 
 def _digest(head: str, entry: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
-from commissioner.errors import NOTHING, Aborted, CommissionerError, DataRefused, DriveError, UsageError
+from commissioner.errors import NOTHING, OF_DISK, Aborted, CommissionerError, DataRefused, DriveError, UsageError
 from commissioner.validation import wanted
 
 MEDIA_TYPE = "application/problem+json"
@@ -89,18 +89,35 @@ def surprise(error: Exception) -> Refusal:
     )  # fmt: skip
 
 
+FULL = OF_DISK - {errno.EROFS, errno.EIO}
+FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
+GONE = {errno.ENOENT, errno.ENOTDIR}
+
+
 def disk_refuses(failure: OSError) -> Refusal:
-    """What needs an entry on the disk is not done without one; a name that no disk takes is not the disk's fault."""
+    """What needs an entry on the disk is not done without one: what the disk says is told, with what mends it."""
+    seen: dict[str, Any] = {
+        "detail": str(failure)[:200],
+        "step": "write down",
+        "value": failure.strerror or str(failure)[:200],
+    }
     if failure.errno == errno.ENAMETOOLONG:
         name = Path(str(failure.filename)).name
         return Refusal(
             422, "a name is too long for a file", step="write down", value=name[:200], limit=f"255 bytes, this one has {len(name.encode())}",
             remedy="give a shorter name; a letter beyond ASCII counts for two bytes or more",
         )  # fmt: skip
-    return Refusal(
-        507, "the disk takes no more", detail=str(failure)[:200], step="write down", value=failure.strerror or str(failure)[:200],
-        limit="room for an entry before anything is done", remedy="make room on the service's disk, then repeat; STOP works without",
-    )  # fmt: skip
+    if failure.errno in FULL:
+        return Refusal(507, "the disk takes no more", **seen, limit="room for an entry before anything is done",
+                       remedy="make room on the service's disk, then repeat; STOP works without")  # fmt: skip
+    if failure.errno in FORBIDDEN:
+        return Refusal(507, "the service may not write here", **seen, limit="a folder that the service may write",
+                       remedy="give the service's user the right to write to its folders, then repeat; STOP works without")  # fmt: skip
+    if failure.errno in GONE:
+        return Refusal(409, "a file of the service has just gone", **seen | {"step": "read a file"}, limit="a file that is there",
+                       remedy="load the page again; what was deleted by hand does not come back")  # fmt: skip
+    return Refusal(507, "the disk did not do this", **seen, limit="a disk that reads and writes",
+                   remedy="look at the service's disk, then repeat; STOP works without")  # fmt: skip
 
 
 _STATUS: Sequence[tuple[type[CommissionerError], int]] = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import datetime as dt
+import itertools
 import json
 import re
 import secrets
@@ -41,6 +42,8 @@ ENDINGS = (
 LARGEST = 1_000_000_000
 """Bytes of one upload."""
 LONGEST_S, KEPT = 1800.0, 50
+LOG = "said.log"
+"""No recording is called so: the verb's words of distress would overwrite it."""
 
 
 @dataclass
@@ -150,7 +153,7 @@ class Recordings:
         arguments += ["--out", str(out)]
         try:
             async with self._one_at_a_time:
-                job.exit_code, job.document = await ask(arguments, job.folder / "said.txt", LONGEST_S)
+                job.exit_code, job.document = await ask(arguments, job.folder / LOG, LONGEST_S)
         except Refusal as refusal:
             job.failure = cast("FailureDocument", refusal.problem.model_dump(mode="json"))
         else:
@@ -178,7 +181,8 @@ async def _keep(folder: Path, name: str, pieces: AsyncIterator[bytes]) -> str:
             limit=", ".join(ENDINGS),
             remedy="give CSV, XLSX, Parquet, MATLAB 5, TDMS, MDF 4 or COMTRADE",
         )
-    size, path = 0, folder / safe
+    size, safe = 0, _unused(folder, safe)
+    path = folder / safe
     with path.open("xb") as file:
         async for piece in pieces:
             size += len(piece)
@@ -193,6 +197,13 @@ async def _keep(folder: Path, name: str, pieces: AsyncIterator[bytes]) -> str:
                 )
             await asyncio.to_thread(file.write, piece)
     return safe
+
+
+def _unused(folder: Path, name: str) -> str:
+    """The name, numbered where another file of the upload has it already."""
+    taken = {path.name.lower() for path in folder.iterdir()}
+    names = (f"{number}_{name}" if number else name for number in itertools.count())
+    return next(called for called in names if called.lower() not in taken)
 
 
 def _say_names(job: Job) -> None:

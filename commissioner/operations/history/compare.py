@@ -16,6 +16,8 @@ from commissioner.identify.estimate.common_ground import CommonGround, Result, b
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.operations.history.runs import Archive, find_runs
 from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.summary import RunSummary
+from commissioner.run.archive.verify import refuse_changed
 from commissioner.run.index.results import flux_level, result_from, result_of
 
 
@@ -71,7 +73,7 @@ SAME_VALUE = 1e-5
 
 def compare_runs(runs: Path, before: str, after: str) -> Compared:
     """UsageError: not two runs. DataRefused: one of them identified nothing."""
-    first, second = find_run(runs, before), find_run(runs, after)
+    first, second = _find(runs, before), _find(runs, after)
     if first.run == second.run:
         raise UsageError(
             "a run cannot be compared with itself", step="compare", value=first.run, limit="two runs",
@@ -85,7 +87,7 @@ def compare_with_recordings(runs: Path, run: str, files: tuple[Path, ...], motor
     """A run beside what `identify` makes of recordings of the same motor, which come after it."""
     from commissioner.operations.recordings.identify import IdentifyRequest, identify
 
-    first = find_run(runs, run)
+    first = _find(runs, run)
     before = result_of(first)
     document = identify(IdentifyRequest(files, motor)).document
     return replace(
@@ -97,7 +99,7 @@ def compare_with_drive(runs: Path, run: str, drive: str | None = None) -> Held:
     """Reads the drive, changes nothing. DataRefused: the drive holds none of the four in the contract's sense."""
     from commissioner.run.write_accepted import held_by_drive
 
-    summary = find_run(runs, run)
+    summary = _find(runs, run)
     result = result_of(summary)
     identity, held = held_by_drive(summary, drive)
     values = dict(zip(PARAMETERS, result.combined.parameters.as_tuple(), strict=True))
@@ -117,6 +119,13 @@ def compare_with_drive(runs: Path, run: str, drive: str | None = None) -> Held:
     if all(abs(row.relative_change) < SAME_VALUE for row in rows):
         return Held(summary.run, identity, "the run's values", rows, level)
     return Held(summary.run, identity, "other values", rows, level, _set_by(runs, held))
+
+
+def _find(runs: Path, run: str) -> RunSummary:
+    """DataRefused: somebody changed its result, so that what moved would be the file and not the motor."""
+    found = find_run(runs, run)
+    refuse_changed(Path(found.folder), "compare", "result.json")
+    return found
 
 
 def _set_by(runs: Path, held: Mapping[str, float]) -> SetBy | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import http.client
 import json
+import re
 import ssl
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from commissioner.operations.history.share import (
     COPIED,
     LEFT,
     NEWER,
+    NOT_TAKEN,
     PIECE,
     THERE,
     UPDATED,
@@ -38,6 +40,11 @@ ANSWER_S = 120.0
 AT_ONCE = PIECE // 2
 """Bytes of one request; the service takes no larger ones."""
 LOG_IN = "/api/login"
+RUN = r"^[0-9]{8}-[0-9]{6}-[\w.\-]{1,150}$"
+FILE = r"^[A-Za-z0-9][\w.\-]{0,99}$"
+"""Names that a service takes: of a run, of a file in it."""
+OF_ONE_RUN = (413, 422)
+"""Refusals that say nothing of the runs after it."""
 LOGGED_OUT = "push again: it logs in anew and goes on where it broke off; the account may have been taken away or changed in between"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -58,7 +65,31 @@ def send(
     by then stays, and the next call goes on from there."""
     folders = [find_folder(runs, name) for name in names] if names else run_folders(runs)
     with _Service(url, account, ca) as service:
-        return tuple(_one(folder, service) for folder in folders)
+        return tuple(_try(folder, service) for folder in folders)
+
+
+class _NotTaken(CommissionerError):
+    """The service refuses this run, not its pusher."""
+
+
+def _try(folder: Path, service: _Service) -> Moved:
+    """One run that is not taken holds up no other."""
+    if not re.search(RUN, folder.name):
+        return Moved(
+            folder.name, NOT_TAKEN, 0, 0, "its folder was given another name than a run has: call it as its run again"
+        )
+    if odd := [name for name in file_names(folder) if not re.search(FILE, name)]:
+        return Moved(
+            folder.name,
+            NOT_TAKEN,
+            0,
+            0,
+            f"a service takes no file called {odd[0]!r}: letters, digits, - _ . without spaces",
+        )
+    try:
+        return _one(folder, service)
+    except _NotTaken as refusal:
+        return Moved(folder.name, NOT_TAKEN, 0, 0, f"{refusal.what}: {refusal.value}; {refusal.remedy}")
 
 
 def _one(folder: Path, service: _Service) -> Moved:
@@ -168,7 +199,8 @@ class _Service:
         if answer.status >= 400:
             is_out = answer.status == 401 and path != LOG_IN
             remedy = (LOGGED_OUT if self._account else "give --account NAME") if is_out else document.get("remedy")
-            raise CommissionerError(
+            kind_of = _NotTaken if answer.status in OF_ONE_RUN and path != LOG_IN else CommissionerError
+            raise kind_of(
                 str(document.get("title", "refused")), step=str(document.get("step") or "push"), value=document.get("value"),
                 limit=document.get("limit"), remedy=str(remedy or ""),
             )  # fmt: skip

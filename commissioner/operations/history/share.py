@@ -22,12 +22,13 @@ from commissioner.run.index.index import JOURNAL, note
 INCOMING = ".incoming"
 """Folder of the target in which runs stand until they are whole; a list does not look into it."""
 PIECE = 1 << 20
-COPIED, UPDATED, THERE, NEWER, LEFT, CONFLICT = (
+COPIED, UPDATED, THERE, NEWER, LEFT, NOT_TAKEN, CONFLICT = (
     "copied",
     "updated",
     "there already",
     "newer there",
     "left: damaged",
+    "left: not taken",
     "conflict",
 )
 CONFLICTING = "the two have gone different ways since they were copied; neither was touched"
@@ -46,7 +47,7 @@ class Moved:
     @property
     def is_good(self) -> bool:
         """False where a person has to look at it."""
-        return self.what not in (LEFT, CONFLICT)
+        return self.what not in (LEFT, NOT_TAKEN, CONFLICT)
 
 
 def push(runs: Path, target: str, names: Sequence[str] = ()) -> tuple[Moved, ...]:

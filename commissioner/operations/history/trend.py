@@ -12,6 +12,7 @@ from commissioner.operations.history.motors import runs_of
 from commissioner.operations.history.runs import Archive
 from commissioner.recordings.baseline import read
 from commissioner.run.archive.catalogue import read_run
+from commissioner.run.archive.verify import changed
 from commissioner.run.index.results import has_result
 from commissioner.run.index.years import measured_in, seconds
 
@@ -35,7 +36,9 @@ def trend(archive: Archive, motor: str, picture: Path | None = None) -> MotorTre
     measured, left_out = [], []
     for row in reversed(runs_of(archive, motor)):
         summary = read_run(Path(row.folder))
-        if has_result(summary):
+        if changed(Path(row.folder), "result.json"):
+            left_out.append(f"{row.run}: result.json is not as the run left it")
+        elif has_result(summary):
             measured.append(measured_in(summary))
         else:
             left_out.append(f"{row.run}: {summary.outcome}, without parameters")

@@ -51,8 +51,9 @@ class Column:
 
 
 def capitalised(text: str) -> str:
-    """Begun with a capital: `DC link sag` stays, `dead time` becomes `Dead time`; a key of a file, as `limits.flux_fraction`, stays."""
-    return text if re.match(r"\w+\.\w", text) else text[:1].upper() + text[1:]
+    """Begun with a capital: `DC link sag` stays, `dead time` becomes `Dead time`; a key of a file, as `limits.flux_fraction`, a file's
+    name and an id stay."""
+    return text if re.match(r"[^\s:]*(\w[._]\w|\d)", text) else text[:1].upper() + text[1:]
 
 
 def coded(text: str) -> Markup:

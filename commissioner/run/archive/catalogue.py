@@ -10,6 +10,8 @@ from pathlib import Path
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.run.archive.summary import RunSummary, read_summary, sound_result, summarise, unreadable
 
+DIGITS = tuple("0123456789")
+
 
 def read_runs(root: Path, *, with_results: bool = True) -> list[RunSummary]:
     """Newest first; empty where there is no archive. A folder that cannot be read is a row that says so."""
@@ -34,7 +36,16 @@ def find_run(root: Path, name: str) -> RunSummary:
 
 def run_folders(root: Path) -> list[Path]:
     """Every folder of a run, newest first, also one whose journal is gone; none where there is no archive."""
-    return sorted((path for path in root.iterdir() if _is_run(path)), reverse=True) if root.is_dir() else []
+    return (
+        sorted((p for p in root.iterdir() if _is_run(p)), key=lambda p: age(p.name), reverse=True)
+        if root.is_dir()
+        else []
+    )
+
+
+def age(name: str) -> tuple[bool, str]:
+    """By which runs are ordered: an id begins with its time; a folder that somebody called otherwise is never the newest."""
+    return name[:1] in DIGITS, name
 
 
 def must_be_archive(root: Path) -> None:
@@ -49,9 +60,9 @@ def must_be_archive(root: Path) -> None:
 def find_folder(root: Path, name: str) -> Path:
     """As `find_run`, its folder; also by the path that a shell completes, `runs/ID/`. UsageError: none or several."""
     given, name = name, _id_of(root, name)
-    names = sorted(os.listdir(root), reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
+    names = sorted(os.listdir(root), key=age, reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
     if name == "last":
-        matching = list(itertools.islice(filter(_is_run, (root / one for one in names)), 1))
+        matching = list(itertools.islice(filter(_has_journal, (root / one for one in names)), 1))
     else:
         matching = [root / one for one in names if one.startswith(name) and _is_run(root / one)]
     exact = [path for path in matching if path.name == name] or matching
@@ -81,6 +92,14 @@ def _id_of(root: Path, name: str) -> str:
     """The folder's name alone, of a path into this archive; any other path is none of its runs, whatever lies there."""
     path = Path(name)
     return path.name if path.name != name and os.path.abspath(path.parent) == os.path.abspath(root) else name  # noqa: PTH100  touches no disk
+
+
+def _has_journal(path: Path) -> bool:
+    """A run that lists show: one whose journal is gone is found by its name alone."""
+    try:
+        return (path / "journal.jsonl").is_file()
+    except OSError:
+        return False
 
 
 def _is_run(path: Path) -> bool:

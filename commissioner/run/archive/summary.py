@@ -138,6 +138,8 @@ def read_summary(folder: Path, journal_bytes: int) -> RunSummary | None:
 def unreadable(folder: Path, error: Exception) -> RunSummary:
     """The row of a folder that cannot be read at all."""
     what = getattr(error, "what", "") or f"{type(error).__name__}: {error}"
+    if isinstance(error, FileNotFoundError):
+        what = f"its {Path(error.filename).name} is missing"
     return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", None, "not known")
 
 

@@ -100,12 +100,25 @@ def refuse_damage(folder: Path, verified: Verified, step: str, *files: str) -> N
     """DataRefused where one of `files` (all, if none is named) is not as the run left it."""
     losses = verified.lost_in(*files) if files else verified.losses
     if losses:
-        first = losses[0]
-        raise DataRefused(
-            f"{folder.name}: {first.file} is not as the run left it", step=step, value=first.what,
-            limit="the file as the run left it", remedy=f"still usable: {verified.usable}; "
-            "`commissioner runs verify` shows all that is lost or changed",
-        )  # fmt: skip
+        raise _damaged(folder, losses[0], step, f"still usable: {verified.usable}; ")
+
+
+def refuse_changed(folder: Path, step: str, *files: str) -> None:
+    """As `refuse_damage`, without looking into the samples: for whoever reads `files` alone."""
+    if losses := changed(folder, *files):
+        raise _damaged(folder, losses[0], step, "")
+
+
+def changed(folder: Path, *files: str) -> tuple[Loss, ...]:
+    """What of these files is not as the run left it, at sight."""
+    return tuple(loss for loss in losses_at_sight(folder) if loss.file in files)
+
+
+def _damaged(folder: Path, loss: Loss, step: str, usable: str) -> DataRefused:
+    return DataRefused(
+        f"{folder.name}: {loss.file} is not as the run left it", step=step, value=loss.what, limit="the file as the run left it",
+        remedy=f"{usable}`commissioner runs verify` shows all that is lost or changed",
+    )  # fmt: skip
 
 
 # --- journal ---------------------------------------------------------------------------------------------------------

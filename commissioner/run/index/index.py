@@ -189,8 +189,10 @@ def _sayable(value: str | int) -> str | int:
 def _select(store: Store, wanted: Wanted, place: str, indexed: str) -> Found:
     rows, count, meant = select(wanted, place, is_shared=store.is_shared)
     bound = {name: _sayable(value) for name, value in meant.items()}
-    found = tuple(
-        map(Row._make, store.read(rows, bound | ({"most": min(wanted.limit, LARGEST - 1)} if wanted.limit > 0 else {})))
-    )
+    found = list[Row]()
+    for statement in rows:
+        most = min(wanted.limit, LARGEST - 1) - len(found)
+        if wanted.limit <= 0 or most > 0:
+            found += map(Row._make, store.read(statement, bound | ({"most": most} if wanted.limit > 0 else {})))
     total = int(store.read(count, bound)[0][0]) if wanted.limit > 0 and len(found) == wanted.limit else len(found)
-    return Found(found, total, indexed)
+    return Found(tuple(found), total, indexed)

@@ -83,11 +83,14 @@ class Wanted:
     limit: int = 0
 
 
+DATED, CALLED = "run{c} >= '0' AND run{c} < ':'", "(run{c} < '0' OR run{c} >= ':')"
+"""As `catalogue.age`: what is not called by its time comes behind all that is. Ranges of the primary key: to sort by an expression
+reads every document."""
 _ALL_WORDS = "lower(run || ' ' || motor || ' ' || motor_serial || ' ' || plate || ' ' || drive || ' ' || person || ' ' || outcome || ' ' || reason)"
 
 
-def select(wanted: Wanted, place: str, *, is_shared: bool) -> tuple[str, str, dict[str, str | int]]:
-    """(the rows newest first, how many there are without the limit, what is bound). Where several places share a database, a run
+def select(wanted: Wanted, place: str, *, is_shared: bool) -> tuple[tuple[str, str], str, dict[str, str | int]]:
+    """(the rows newest first, in two statements, how many there are without the limit, what is bound). Where several places share a database, a run
     that lies in more than one of them is told once, from here if it is here."""
     bound: dict[str, str | int] = {}
     parts = []
@@ -123,8 +126,12 @@ def select(wanted: Wanted, place: str, *, is_shared: bool) -> tuple[str, str, di
     where = f" WHERE {' AND '.join(parts)}"
     limit = " LIMIT :most" if wanted.limit > 0 else ""
     count = f"SELECT count(*) FROM {source}{where}"
-    rows = f"SELECT {COLUMNS} FROM {source}{where} ORDER BY run DESC{limit}"
-    return rows, count, bound
+    collation = ' COLLATE "C"' if is_shared else ""
+    dated, called = (
+        f"SELECT {COLUMNS} FROM {source}{where} AND {half.format(c=collation)} ORDER BY run{collation} DESC{limit}"
+        for half in (DATED, CALLED)
+    )
+    return (dated, called), count, bound
 
 
 def row_of(summary: RunSummary, place: str, stamp: tuple[int, int]) -> Row:

@@ -16,6 +16,7 @@ from starlette.requests import HTTPConnection
 from commissioner.motor.circuit import QUANTILE
 from commissioner.motor.quantities import places
 from commissioner.report.sheet.words import NBSP
+from commissioner.run.stopping.dead_man import SERVICE
 from commissioner.service.access.visitors import LOCAL
 from commissioner.service.problems import Refusal
 
@@ -96,8 +97,12 @@ class Texts:
         return str(value) if is_name else self.short(value, unit)
 
     def person(self, name: str) -> str:
-        """Who did it; whoever sits at this computer without an account is called by what they do."""
-        return self.gettext(name) if name == LOCAL else name
+        """Who did it; whoever sits at this computer without an account is called by what they do, the service by what it is."""
+        return self.gettext(name) if name in (LOCAL, SERVICE) else name
+
+    def why(self, person: str, reason: str) -> str:
+        """Why somebody stopped a run: in their own words, the service's in the reader's language."""
+        return self.tell(reason) if person == SERVICE else reason
 
     def knows(self, text: object) -> bool:
         """Whether `tell` has it in this language."""

@@ -8,13 +8,14 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from commissioner.operations.history.send import FILE, RUN
 from commissioner.operations.history.share import Moved
 from commissioner.service.access.visitors import Operator, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.incoming import KeptPiece, OfferedRun
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.incoming import FILE, LARGEST, MOST_FILES, RUN
+from commissioner.service.runs.incoming import LARGEST, MOST_FILES
 
 router = APIRouter(route_class=Typed)
 Run = Annotated[str, Path(pattern=RUN)]

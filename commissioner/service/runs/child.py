@@ -18,6 +18,8 @@ from commissioner.service.problems import Refusal
 BEGIN_S = 60.0
 """Until a run has its folder: imports on a slow disk included."""
 SENT_BACK = {2: 422, 3: 409, 4: 409, 5: 502}
+OF_KIND = {"DriveInUse": 409, "DiskRefused": 507}
+"""What also ends with 5, and is no failure of drive or link."""
 
 
 def program(*arguments: str) -> list[str]:
@@ -165,7 +167,8 @@ def _refusal(code: int, document: JsonObject, log: Path) -> Refusal:
         said = log.read_text("utf-8", "replace").strip().splitlines() if log.is_file() else []
         error = {"what": "the process ended without a word", "step": "run", "value": (said or ["nothing"])[-1][:200],
                  "limit": "a result", "remedy": f"see {log}"}  # fmt: skip
+    status = OF_KIND.get(str(error.get("kind")), SENT_BACK.get(code, 503))
     return Refusal(
-        SENT_BACK.get(code, 503), str(error.get("what", "")), detail=str(error.get("what", "")), step=str(error.get("step") or ""),
+        status, str(error.get("what", "")), detail=str(error.get("what", "")), step=str(error.get("step") or ""),
         value=error.get("value"), limit=error.get("limit"), remedy=str(error.get("remedy") or ""),
     )  # fmt: skip

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 from commissioner.service.problems import Refusal
 
+LEFT_S = 2.0
+"""Whose page is gone for longer than a reload takes asks for nothing any more."""
+
 
 @dataclass(frozen=True)
 class Party:
@@ -111,5 +114,11 @@ class Control:
         self.holder, self._asking = None, None
 
     def _settle(self) -> None:
-        if self._asking is not None and self._clock() - self._asked_s >= self._hand_over_s:
+        """Control passes to who asked and is still there: else a page that was closed would take it along, and end the run."""
+        if self._asking is None:
+            return
+        lost_s = self._pages.lost_for_s(self._asking.session)
+        if lost_s > LEFT_S:
+            self._asking = None
+        elif lost_s == 0.0 and self._clock() - self._asked_s >= self._hand_over_s:
             self.holder, self._asking = self._asking, None

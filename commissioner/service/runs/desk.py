@@ -23,6 +23,7 @@ from commissioner.service.runs.child import Child
 from commissioner.service.runs.control import Control, Pages, Party
 from commissioner.service.runs.feed import Feed
 from commissioner.service.runs.others import drive_at, going_on, is_copied, request_of
+from commissioner.service.runs.starting import Starting
 from commissioner.service.runs.watch import DriveWatch
 from commissioner.settings import load_procedure
 
@@ -63,12 +64,6 @@ class LiveRun:
 
 
 @dataclass
-class _Pending:
-    party: Party
-    child: Child
-
-
-@dataclass
 class Desk:
     """The one place that starts and stops runs."""
 
@@ -77,7 +72,7 @@ class Desk:
     audit: Audit
     pages: Pages = field(default_factory=Pages)
     runs: dict[str, LiveRun] = field(default_factory=dict)
-    _pending: dict[str, _Pending] = field(default_factory=dict)
+    _starting: dict[str, Starting] = field(default_factory=dict)
     _controls: dict[str, Control] = field(default_factory=dict)
     _watches: dict[str, DriveWatch] = field(default_factory=dict)
     _holding: frozenset[str] = frozenset()
@@ -96,7 +91,7 @@ class Desk:
         return next((run for run in self.live() if run.drive == drive and not run.has_freed_drive), None)
 
     def is_starting(self, drive: str) -> bool:
-        return drive in self._pending
+        return drive in self._starting
 
     def control(self, drive: str) -> Control:
         return self._controls.setdefault(drive, Control(self.pages, self.settings.file.service.hand_over_s))
@@ -114,26 +109,28 @@ class Desk:
         self._check_free(drive)
         self.control(drive.id).take(party)
         watch = self.watch(drive)
-        child = await Child.start(self._arguments(drive, motor, verb), self.log("run", drive.id))
-        self._pending[drive.id] = _Pending(party, child)
+        starting = self._starting[drive.id] = Starting(party)
         try:
+            child = starting.hold(await Child.start(self._arguments(drive, motor, verb), self.log("run", drive.id)))
             await asyncio.to_thread(watch.pause)
             origin = {"person": party.person, "by": "service", "drive": drive.id, "motor": motor.id}
             folder = await child.begin(origin)
         except BaseException:
-            child.kill()
+            if starting.child is not None:
+                starting.child.kill()
             watch.resume()
             raise
         finally:
-            self._pending.pop(drive.id, None)
+            self._starting.pop(drive.id, None)
         run = LiveRun(folder.name, drive.id, motor.id, Feed(folder), party, child)
         self._add(run)
         return run
 
     def _check_free(self, drive: Drive) -> None:
-        holder = self.live_on(drive.id)
-        if holder is not None or drive.id in self._pending:
-            person = holder.party.person if holder and holder.party else "a run from the command line"
+        holder, starting = self.live_on(drive.id), self._starting.get(drive.id)
+        if holder is not None or starting is not None:
+            party = holder.party if holder is not None else starting and starting.party
+            person = party.person if party else "a run from the command line"
             raise Refusal(409, f"{drive.name} is in use: {person}", step="start a run", value=holder.id if holder else "starting",
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
@@ -235,9 +232,9 @@ class Desk:
 
     async def stop_all(self, person: str, reason: str, drive: str | None = None) -> list[Stopped]:
         """Every run of this service, or of one drive; those that are only starting never begin."""
-        for name, pending in list(self._pending.items()):
+        for name, starting in list(self._starting.items()):
             if drive in (None, name):
-                pending.child.stop(person, reason)
+                starting.stop(person, reason)
         runs = [run for run in self.live() if drive in (None, run.drive)]
         return list(await asyncio.gather(*(self.stop(run, person, reason) for run in runs)))
 
@@ -259,7 +256,7 @@ class Desk:
 
     def _is_beginning(self, folder: Path) -> bool:
         """Of our own: its child says so itself."""
-        return bool(self._pending) and bool(origin_of(request_of(folder)))
+        return bool(self._starting) and bool(origin_of(request_of(folder)))
 
     async def _take_up(self, folder: Path) -> None:
         request = request_of(folder)

@@ -18,8 +18,6 @@ from commissioner.run.index.index import JOURNAL
 from commissioner.service.contract.incoming import FileHere, JournalHere, OfferedRun
 from commissioner.service.problems import Refusal
 
-RUN = r"^[0-9]{8}-[0-9]{6}-[\w.\-]{1,150}$"
-FILE = r"^[A-Za-z0-9][\w.\-]{0,99}$"
 LARGEST, MOST_FILES = 2_000_000_000, 100
 """Bytes of one file, files of one run."""
 FORGOTTEN_S = 7 * 86400.0

@@ -11,6 +11,8 @@ from commissioner.cli.verbs.archived.comparing import compare_drive
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError
 from commissioner.identify.estimate.axes import Identity
 from commissioner.operations.history.compare import SetBy, compare_runs, compare_with_drive, compare_with_recordings
+from commissioner.operations.history.runs import Archive
+from commissioner.operations.history.trend import trend
 from commissioner.operations.recordings import identify
 from commissioner.run import write_accepted
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
@@ -100,3 +102,21 @@ def test_a_run_without_result_or_beside_itself_is_refused(tmp_path):
         compare_runs(tmp_path, "20260101", "last")
     with pytest.raises(UsageError, match="with itself"):
         compare_runs(tmp_path, "20260101", "20260101")
+
+
+def test_a_result_that_somebody_changed_is_neither_compared_nor_part_of_a_trend(tmp_path):
+    """A changed file would be told as a changed motor."""
+    for number in (1, 2, 3):
+        folder = make_run(
+            tmp_path,
+            f"2026010{number}-000000-x-abcdef",
+            result=result_of(f"{number}", MACHINE),
+            origin={"motor_tag": "A"},
+        )
+    path = folder / "result.json"
+    path.write_text(path.read_text("utf-8").replace("3.716", "3.916"), "utf-8")
+    with pytest.raises(DataRefused, match=r"result\.json is not as the run left it"):
+        compare_runs(tmp_path, "20260101", "last")
+    assert compare_runs(tmp_path, "20260101", "20260102").comparison.verdict is not Identity.CHANGED
+    told = trend(Archive(tmp_path), "A")
+    assert told.left_out == (f"{folder.name}: result.json is not as the run left it",)

@@ -11,7 +11,7 @@ import pytest
 
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.operations.archive import verify_runs
-from commissioner.run.archive.catalogue import read_runs
+from commissioner.run.archive.catalogue import find_folder, read_runs
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.index import index
 from commissioner.run.index.index import ARCHIVE, find, note, refresh
@@ -80,6 +80,25 @@ def test_signs_of_the_language_mean_themselves(root, database, sign):
     assert told(root, database, text=sign) == []
     make_run(root, "20990101-000000-simulated-aaaaaa", person=f"O{sign}Neill", outcome="aborted")
     assert told(root, database, person=sign) == ["20990101-000000-simulated-aaaaaa"]
+
+
+@pytest.mark.parametrize("limit", [0, 1, 2])
+def test_a_folder_that_somebody_called_otherwise_is_never_the_newest(tmp_path, database, limit):
+    """`restore last` would write what an old run found."""
+    for name in (
+        "pump7-before",
+        "20260101-060000-simulated-000abc",
+        "20260102-060000-simulated-000abc",
+        "Übergabe",
+        "(copy)",
+    ):
+        make_run(tmp_path / "runs", name)
+    newest = ["20260102-060000-simulated-000abc", "20260101-060000-simulated-000abc"]
+    found = find(tmp_path / "runs", Wanted(limit=limit), database)
+    assert names(found)[:2] == newest[: limit or 2]
+    assert found.total == 5
+    assert find_folder(tmp_path / "runs", "last").name == newest[0]
+    assert by_folders(tmp_path / "runs")[:2] == newest
 
 
 def test_a_limit_tells_how_many_there_are(root, database):

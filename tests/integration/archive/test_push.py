@@ -86,6 +86,16 @@ def test_a_run_arrives_bit_for_bit_and_a_second_push_sends_nothing(service, run)
     assert [(entry["person"], entry["what"]) for entry in told] == [("otto", "took in a pushed run")]
 
 
+def test_a_run_that_the_service_does_not_take_holds_up_no_other(service, run, tmp_path):
+    make_run(run.parent, "renamed").rename(run.parent / "pump7")
+    with_photo = make_run(run.parent, "photo")
+    (with_photo / "plate of pump 7.jpg").write_bytes(b"jpg")
+    told = {moved.run: (moved.what, moved.why) for moved in send(run.parent, service.url, account=OTTO)}
+    assert told[run.name][0] == "copied"
+    assert told["pump7"][0] == told[with_photo.name][0] == "left: not taken"
+    assert "another name" in told["pump7"][1] and "plate of pump 7.jpg" in told[with_photo.name][1]
+
+
 def test_what_a_power_loss_left_behind_the_journal_stays_at_home(service, run):
     before = content(run)
     with (run / "journal.jsonl").open("ab") as journal:

@@ -26,11 +26,13 @@ PAGE = PRODUCT / "service" / "page"
 SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py", "run/inspection.py",
         "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py", "service/library.py", "service/recordings.py", "service/simulator.py", "operations/history/runs.py", "run/ending.py", "run/archive/documents.py", "run/write_accepted.py", "run/restore.py", "run/holding", "run/tuning",
-        "link/drive", "procedure/tuned.py")  # fmt: skip
+        "link/drive", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
 FACTS = ("what", "title", "remedy")
-NOT_SHOWN = re.compile(r"^there is no 7 7$|POST /api|choose one of these$|^7 in the drive$|nameplate7$|^7 is 7$|^$")
-"""Of scripts alone; and the drive's plate, whose checks have a name for each of its keys."""
+NOT_SHOWN = re.compile(
+    r"^there is no 7 7$|POST /api|choose one of these$|^7 in the drive$|nameplate7$|^7 is 7$|^7: 7$|^$"
+)
+"""Of scripts alone; a file's name before a sentence that stands elsewhere; and the drive's plate, whose checks have a name for each of its keys."""
 
 
 @pytest.fixture(scope="module")
@@ -115,6 +117,14 @@ def core_sentences():
             yield from ((path.name, text) for text in found if " " in text and not NOT_SHOWN.search(text))
 
 
+def of_tables():
+    """What the table of a recording is refused for, behind the file's name, and what to do."""
+    for node in ast.walk(ast.parse((PRODUCT / "recordings/table.py").read_text("utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "_refuse":
+            yield from (f"7: {text}" for text in shown(node.args[1]))
+            yield from shown(node.args[-1])
+
+
 def of_tunings():
     """What the drive files say to whoever stands at the drive, and what is said of every tuning."""
     for name in known_drives():
@@ -146,6 +156,12 @@ def test_every_sentence_of_checks_guards_and_refusals_has_its_translation():
         {f"{place}: {text}" for place, text in core_sentences() if not german.knows(text.removesuffix(", degC"))}
     )
     assert missing == []
+
+
+def test_what_a_recordings_table_is_refused_for_has_its_translation():
+    german, told = Texts("de"), set(of_tables())
+    assert len(told) > 30
+    assert sorted(text for text in told if not german.knows(text)) == []
 
 
 def test_what_to_do_about_each_refused_request_has_its_translation():

@@ -1,5 +1,6 @@
 """Sizes of causes as the page writes them."""
 
+import re
 from importlib.resources import files
 from types import SimpleNamespace
 
@@ -11,9 +12,11 @@ from commissioner.identify.excite.duration import LongerTest
 from commissioner.identify.intake.alignment import TimeShift
 from commissioner.link.files.drive_file import known_drives, load_profile
 from commissioner.procedure.checks import check_name
+from commissioner.procedure.states import ENDED, State
 from commissioner.procedure.tuned import FEWEST
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.report.sheet.words import NBSP
+from commissioner.run.archive import summary
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import IN_THE_DRIVE, Words
@@ -188,3 +191,44 @@ def test_a_write_that_failed_is_told_whole_in_german():
     assert "im Umrichter steht rotor_resistance = 3,2 statt 3,7" in said
     assert german.short("the memory failed (3)") == "der Speicher hat versagt (3)"
     assert german.short("at least 3.5") == "mindestens 3,5"
+
+
+@pytest.mark.parametrize("state", [state for state in State if state is not State.IDLE and state not in ENDED])
+def test_how_far_a_cut_off_run_came_is_told_in_german(state):
+    said = Texts("de").tell(f"the process ended while {state.value}")
+    assert said.startswith("der Prozess endete beim ") and state.value not in said
+
+
+@pytest.mark.parametrize(
+    "reason", ["the service that started this run is gone", "nothing heard from the service for 2 s",
+               "the operator's page was lost for 6 s", "the service is being shut down"],
+)  # fmt: skip
+def test_why_the_service_stopped_a_run_is_told_in_german_and_a_persons_words_stay(reason):
+    german = Texts("de")
+    assert german.why("service", reason) not in ("", reason)
+    assert german.why("anna", reason) == reason
+    assert german.person("service") == "Dienst"
+
+
+@pytest.mark.parametrize("kind", ["parameters_written", "snapshot_restored", "about_to"])
+@pytest.mark.parametrize("facts", [{}, {"is_stored": False}, {"store_count_after": 3, "endurance_writes": 100000}, {"is_stored": False, "store_count_after": 3, "endurance_writes": 9}])  # fmt: skip
+def test_what_a_drive_holds_after_a_run_is_told_in_german(kind, facts):
+    """Above all of a run that was cut off while it wrote."""
+    said = summary._written([{"kind": kind, "record": facts | {"action": "commit"}}])
+    german = Texts("de").tell(said)
+    assert not set(re.findall(r"[a-z]{3,}", german)) & {
+        "new",
+        "old",
+        "read",
+        "stored",
+        "before",
+        "drive",
+        "used",
+        "writes",
+    }
+
+
+@pytest.mark.parametrize("name", ["leer.csv", "my-file.csv", "20261129-082711-x", "hall3"])
+def test_a_file_or_an_id_that_begins_a_sentence_keeps_its_letters(name):
+    said = Words(Texts("de")).sentence(f"{name}: the file is empty")
+    assert said == f"{name}: Die Datei ist leer"

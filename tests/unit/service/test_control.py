@@ -1,0 +1,131 @@
+"""Who clicks first has the drive, from the click on; a STOP reaches a run whose process is not there yet; control passes only to
+somebody who is there."""
+
+import asyncio
+
+import pytest
+
+from commissioner.service.configuration import Settings
+from commissioner.service.parts import make_parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs import child, desk
+from commissioner.service.runs.control import Control, Pages, Party
+
+
+class SlowChild:
+    """A process that takes a moment to come, then says that it was stopped before it began."""
+
+    made = 0
+
+    def __init__(self):
+        self.said = []
+
+    @classmethod
+    async def start(cls, _arguments, _log):
+        cls.made += 1
+        await asyncio.sleep(0.02)
+        return cls()
+
+    async def begin(self, _origin):
+        await asyncio.sleep(0.02)
+        raise Refusal(409, f"stopped by {self.said}", step="", value="", limit="", remedy="")
+
+    def stop(self, *words):
+        self.said.append(words)
+
+    def kill(self):
+        pass
+
+
+@pytest.fixture
+def parts(tmp_path, monkeypatch):
+    monkeypatch.setattr(desk, "Child", SlowChild)
+    SlowChild.made = 0
+    return make_parts(Settings(tmp_path / "runs", tmp_path / "data"))
+
+
+def begin(parts, people, stop=None):
+    """What each is told who starts a run on one drive at once."""
+
+    async def at_once():
+        drive, motor = parts.library.drives()[0], parts.library.motors()[0]
+        tasks = [asyncio.create_task(parts.desk.start(drive, motor, ["run"], Party("", person))) for person in people]
+        await asyncio.sleep(0)
+        if stop:
+            await parts.desk.stop_all(*stop)
+        return [str(one.problem.title) for one in await asyncio.gather(*tasks, return_exceptions=True)]
+
+    return asyncio.run(at_once())
+
+
+def test_of_two_who_start_at_once_one_is_told_who_was_first(parts):
+    _first, second = begin(parts, ("anna", "anna"))
+    assert SlowChild.made == 1
+    assert second.endswith("is in use: anna")
+
+
+def test_a_stop_reaches_a_run_whose_process_is_not_there_yet(parts):
+    assert begin(parts, ("anna",), stop=("bert", "wait")) == ["stopped by [('bert', 'wait')]"]
+
+
+@pytest.mark.parametrize(("kind", "status"), [("DriveInUse", 409), ("DiskRefused", 507), ("LinkUnreachable", 502)])
+def test_a_drive_in_use_or_a_full_disk_is_no_broken_drive(tmp_path, kind, status):
+    refusal = child._refusal(5, {"error": {"kind": kind, "what": "no run"}}, tmp_path / "log")
+    assert refusal.problem.status == status
+
+
+ANNA, BERT, SCRIPT = Party("a", "anna"), Party("b", "bert"), Party("", "script")
+
+
+@pytest.fixture
+def clock():
+    return [100.0]
+
+
+@pytest.fixture
+def pages(clock):
+    made = Pages(lambda: clock[0])
+    made.opened("a")
+    made.opened("b")
+    return made
+
+
+@pytest.fixture
+def control(pages, clock):
+    made = Control(pages, 15.0, lambda: clock[0])
+    made.take(ANNA)
+    made.ask(BERT)
+    return made
+
+
+def test_who_asked_and_closed_the_page_takes_control_from_nobody(control, pages, clock):
+    """Control without a page would end the run that anna looks after."""
+    pages.closed("b")
+    clock[0] += 16.0
+    assert control.is_held_by(ANNA) and control.asking is None
+
+
+def test_a_reload_while_asking_takes_nothing_away(control, pages, clock):
+    pages.closed("b")
+    clock[0] += 1.0
+    assert control.asking == BERT
+    pages.opened("b")
+    clock[0] += 15.0
+    assert control.is_held_by(BERT)
+
+
+def test_control_passes_to_no_page_in_the_midst_of_a_reload(control, pages, clock):
+    clock[0] += 14.5
+    pages.closed("b")
+    clock[0] += 1.0
+    assert control.is_held_by(ANNA)
+    pages.opened("b")
+    assert control.is_held_by(BERT)
+
+
+def test_a_script_has_no_page_to_lose(pages, clock):
+    control = Control(pages, 15.0, lambda: clock[0])
+    control.take(ANNA)
+    control.ask(SCRIPT)
+    clock[0] += 16.0
+    assert control.is_held_by(SCRIPT)
