@@ -314,6 +314,11 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
         if is_aslant(r.axis_deg) and r.batch.model.leg is not None
     ]
     for result in results:
+        if result.turning_rad_per_s:
+            remarks.append(
+                f"axis {result.axis_deg:g} deg: the shaft turned, at {result.turning_rad_per_s:.2g} rad/s (electrical) or more; standard errors "
+                "are widened for it"
+            )
         if result.disagreement_sigmas > LARGEST_DISAGREEMENT:
             remarks.append(
                 f"axis {result.axis_deg:g} deg: observer and batch fit differ by {result.disagreement_sigmas:.1f} "

@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 
 from commissioner.identify.analysis import Identification, axis_at
+from commissioner.identify.estimate.turning import turning_doubt
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
 from commissioner.motor.plate_match import PlateMatch, plate_match, sure_mismatch
@@ -65,7 +66,8 @@ Values = Mapping[str, Quantity]
 class Evidence:
     """What the verdict is reached from: combined values, each test's values, each test's batch fit beside them, and each
     test's values at the flux all of them reached. `unlike`: why the axes differ more than by chance, in words, and by how much, relative; `lost_samples` of all tests;
-    `guard_acted`: the flux guard took the amplitude back; `beyond_time`: names that a longer test would not make surer."""
+    `guard_acted`: the flux guard took the amplitude back; `beyond_time`: names that a longer test would not make surer; `turned`: tests
+    in which the shaft turned, by what speed (electrical, rad/s), and what that makes doubtful of every value, relative."""
 
     combined: Values
     axes: tuple[tuple[float, Values], ...]
@@ -75,6 +77,7 @@ class Evidence:
     lost_samples: int = 0
     guard_acted: bool = False
     beyond_time: frozenset[str] = frozenset()
+    turned: tuple[tuple[float, float, float], ...] = ()
 
 
 def evidence_of(identification: Identification) -> Evidence:
@@ -90,6 +93,11 @@ def evidence_of(identification: Identification) -> Evidence:
         at_one_flux=tuple((e.axis_deg, _values(e.parameters, s)) for e, s in zip(alike, std, strict=True)),
         unlike=tuple((f.cause.value, f.relative_size) for f in identification.combined.findings),
         lost_samples=identification.lost_samples,
+        turned=tuple(
+            (a.axis_deg, a.turning_rad_per_s, turning_doubt(a.turning_rad_per_s, a.parameters))
+            for a in axes
+            if a.turning_rad_per_s
+        ),
     )
 
 
@@ -102,6 +110,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
     objections = (
         *_another_motor(evidence.combined, plate),
         *_outside(evidence.combined, prior(plate)),
+        *_turned(evidence, acceptance),
         *_disagreements(evidence, acceptance),
         *_uncertain(evidence, acceptance),
         *_spread(evidence, acceptance),
@@ -136,6 +145,17 @@ def _outside(combined: Mapping[str, Quantity], box: ParameterBox) -> Iterator[Ob
                 in_shown_unit(name, value),
                 in_shown_unit(name, low, high),
                 "check the motor's connection and that --motor is the motor at the drive",
+            )
+
+
+def _turned(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
+    for axis_deg, speed, doubt in evidence.turned:
+        if 100 * doubt > acceptance.resistance_std_percent:
+            yield Objection(
+                f"the shaft turned during the test of axis {axis_deg:g} deg",
+                f"{speed:.2g} rad/s, electrical, which makes every value uncertain by {100 * doubt:.2g} %",
+                f"{acceptance.resistance_std_percent:g} %",
+                "hold the shaft still: close the brake or take the load off, and test again",
             )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from commissioner.errors import DriveFault
 from commissioner.link.drive.inverter import Inverter
 from commissioner.records import DriveStatus, SampleBlock
 from commissioner.registers.window import StreamCursor
-from commissioner.safety.freshness import DriveClock
+from commissioner.safety.freshness import Counted, DriveClock
 from commissioner.safety.sensors import SensorWatch
 from commissioner.safety.watch import WatchLimits, judge_status, stop_if
 
@@ -38,8 +39,11 @@ class Stream:
         """The motor is de-energised: what the drive has kept has no age that matters."""
         self._inverter, self._cursor, self._watch = inverter, cursor, watch
         self._began_s, self._asked_s, self._took_s = began_s, -math.inf, 0.0
-        self._clock: DriveClock | None = None
         self._waiting: SampleBlock | None = None
+
+    @cached_property
+    def _clock(self) -> DriveClock:
+        return DriveClock(self._began_s, self._cursor.stream.sample_period_s)
 
     def next_block(self, longest_s: float) -> SampleBlock | None:
         """The next block with the largest age its last sample can have; None once the drive has ended the session.
@@ -65,12 +69,19 @@ class Stream:
             age_s = self._age_s(block)
         return replace(block, age_s=age_s)
 
+    def supervise(self) -> DriveStatus:
+        """As `ask_status`, where nobody reads samples: how many there are tells how fast the drive's time passes."""
+        status = self.ask_status()
+        if status.is_energised and status.samples_produced > 0:
+            self._pin(Counted(status.samples_produced, self._asked_s, self._inverter.now_s()))
+        return status
+
     def ask_status(self) -> DriveStatus:
         """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
         self._asked_s = self._inverter.now_s()
         status = self._inverter.read_status()
         stop_if(judge_status(status, self._watch))
-        if self._clock is not None and status.samples_produced > 0:
+        if status.samples_produced > 0:
             self._clock = self._clock.at_most(status.samples_produced, self._asked_s)
         self.sensors.claim(status)
         return status
@@ -103,23 +114,24 @@ class Stream:
         block = window.block
         if block is None:
             return None
-        if self._clock is None:
-            self._clock = DriveClock(self._began_s, block.sample_period_s)
-        if block.count < (most or self._cursor.stream.samples_per_window):
-            self._clock = self._clock.at_most(self._cursor.next_index, asked_s)
+        if block.count < (most or self._cursor.stream.samples_per_window) and not (self.is_over or window.has_ended):
+            self._pin(Counted(self._cursor.next_index, asked_s, asked_s + self._took_s))
         return block
+
+    def _pin(self, counted: Counted) -> None:
+        stop_if(self._clock.judge(counted))
+        clock = self._clock.at_most(counted.samples, counted.sent_s)
+        self._clock = replace(clock, first=clock.first or counted)
 
     def _most(self, now_s: float) -> int | None:
         """Samples that can be there: over a slow link room for more would only delay them. None: a whole window."""
         stream = self._cursor.stream
         if stream.averaged == 1 or self.is_over:
             return None
-        began_s = self._began_s if self._clock is None else self._clock.began_after_s
-        there = (now_s - began_s) / stream.sample_period_s - self._cursor.next_index
+        there = (now_s - self._clock.began_after_s) / stream.sample_period_s - self._cursor.next_index
         return min(stream.samples_per_window, math.ceil(ROOM * max(there, 0.0)) + 2)
 
     def _age_s(self, block: SampleBlock) -> float:
-        assert self._clock is not None
         return self._clock.age_s(block.first_index + block.count, self._inverter.now_s())
 
 

@@ -4,11 +4,30 @@ A session's sample k ends (k + 1) periods after the drive began. When that was, 
 the request that enabled the drive was sent; and a drive that was asked at `sent_s` and had made no more than n samples
 began not before `sent_s` less n + 1 periods. The latest of these is the tightest. From it follows the largest age that a
 sample can have. Nothing here reads a clock: times are data.
+
+A window that was not full ends with the newest sample there was: two of them tell how fast the drive's time passes. All
+inductances are as wrong as the period that the drive states, and ages are too small where it is too long.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+
+from commissioner.safety.watch import StopReason
+
+MOST_OFF, SLACK_S = 0.005, 0.01
+"""Of the time between two counts, and besides: what the drive's time may differ from ours. Samples may be counted in bursts."""
+OTHER_TIME = 1.5
+"""A time that passes so many times as fast is meant to: a simulated inverter's (`--speed N`)."""
+
+
+@dataclass(frozen=True)
+class Counted:
+    """The drive had made `samples`, no more and no less, at some moment from `sent_s` to `answered_s` of our clock."""
+
+    samples: int
+    sent_s: float
+    answered_s: float
 
 
 @dataclass(frozen=True)
@@ -17,6 +36,7 @@ class DriveClock:
 
     began_after_s: float
     sample_period_s: float
+    first: Counted | None = None
 
     def at_most(self, samples: int, sent_s: float) -> DriveClock:
         """The answer to a request sent at `sent_s` showed that the drive had made `samples` and no more."""
@@ -26,3 +46,20 @@ class DriveClock:
     def age_s(self, samples: int, now_s: float) -> float:
         """The largest time that can have passed since sample number `samples` - 1 ended."""
         return max(0.0, now_s - self.began_after_s - samples * self.sample_period_s)
+
+    def judge(self, now: Counted) -> StopReason | None:
+        """Whether the drive's time between the first count and this one contradicts ours."""
+        if self.first is None:
+            return None
+        drive_s = (now.samples - self.first.samples) * self.sample_period_s
+        least_s, most_s = now.sent_s - self.first.answered_s, now.answered_s - self.first.sent_s
+        allowed_s = SLACK_S + self.sample_period_s
+        is_near = most_s / OTHER_TIME < drive_s < least_s * OTHER_TIME
+        if not is_near or least_s * (1.0 - MOST_OFF) - allowed_s <= drive_s <= most_s * (1.0 + MOST_OFF) + allowed_s:
+            return None
+        ours_s = 0.5 * (least_s + most_s)
+        return StopReason(
+            "the drive's samples do not come as often as it says", ours_s / (now.samples - self.first.samples),
+            f"{self.sample_period_s:.6g} s within {MOST_OFF:.1%}, by this computer's clock",
+            "check the control period that the firmware states, and the clock of this computer", is_fault=True, unit="s",
+        )  # fmt: skip

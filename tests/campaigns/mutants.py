@@ -39,6 +39,18 @@ TARGETS = {
 ROUNDED = "equality of two rounded numbers"
 EXPLAINED = {
     (
+        "commissioner.safety.freshness",
+        "least_s * (1.0 - MOST_OFF) - allowed_s <= drive_s <",
+    ): "rounded numbers would have to be equal",
+    (
+        "commissioner.safety.freshness",
+        "least_s * (1.0 - MOST_OFF) - allowed_s < drive_s",
+    ): "rounded numbers would have to be equal",
+    (
+        "commissioner.safety.freshness",
+        "most_s / OTHER_TIME <",
+    ): "rounded numbers would have to be equal",
+    (
         "commissioner.safety.watch",
         "-(block.current_u_a + block.current_v_a)",
     ): "the same: only the magnitude of the third phase is looked at",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -18,6 +19,7 @@ from commissioner.identify.batch.slow_noise import widened
 from commissioner.identify.batch.starts import from_impedance
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
 from commissioner.identify.estimate.sufficiency import require_conditioned
+from commissioner.identify.estimate.turning import turning_doubt, turning_rad_per_s
 from commissioner.identify.intake.alignment import more_periods
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
@@ -62,6 +64,7 @@ class AxisResult:
     peak_stator_flux_wb: float
     staircase: Staircase | None
     energised_s: float
+    turning_rad_per_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -212,7 +215,8 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     disagreement = _disagreement(pao, at_flux, own + np.diag(covariance))
     values, least_squares = np.array(pao.as_tuple()), np.array(at_flux.as_tuple())
     missed = values / least_squares - 1.0 if estimator == "lyapunov" else np.zeros(4)
-    law_error = np.hypot(missed, aslant_doubt(stretches, batch))
+    turning = turning_rad_per_s(stretches, at_flux, period_s)
+    law_error = np.hypot(missed, math.hypot(aslant_doubt(stretches, batch), turning_doubt(turning, at_flux)))
     of_batch = estimator == "nls" or batch.model.with_split  # the observer has its iron at the stator
     return AxisResult(
         axis_deg=axis_deg,
@@ -227,6 +231,7 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
         peak_stator_flux_wb=flux,
         staircase=fit.staircase,
         energised_s=sum(s.voltage_v.size for s in stretches) * period_s,
+        turning_rad_per_s=turning,
     )
 
 

@@ -108,3 +108,12 @@ def test_what_is_only_unusual_is_rejected_where_that_was_asked_for(unusual, word
         ).decision
         is Decision.WRITE_BACK
     )
+
+
+def test_a_shaft_that_turned_is_the_reason_where_it_makes_values_too_uncertain():
+    evidence = replace(Evidence(VALUES, ((0.0, VALUES),)), turned=((0.0, 0.4, 0.004), (60.0, 2.0, 0.08)))
+    verdict = decide(evidence, PLATE, ACCEPTANCE, write_back=True)
+    assert [o.what for o in verdict.objections] == ["the shaft turned during the test of axis 60 deg"]
+    assert "2 rad/s" in str(verdict.objections[0].value)
+    still = replace(evidence, turned=((0.0, 0.4, 0.004),))
+    assert decide(still, PLATE, ACCEPTANCE, write_back=True).decision is Decision.WRITE_BACK
