@@ -216,7 +216,7 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     values, least_squares = np.array(pao.as_tuple()), np.array(at_flux.as_tuple())
     missed = values / least_squares - 1.0 if estimator == "lyapunov" else np.zeros(4)
     aslant = aslant_doubt(stretches, batch)
-    turning = 0.0 if aslant else turning_rad_per_s(stretches, at_flux, period_s)  # one current beside the axis, one reason
+    turning = 0.0 if aslant else turning_rad_per_s(stretches, at_flux, period_s)  # a current has one reason
     law_error = np.hypot(missed, math.hypot(aslant, turning_doubt(turning, at_flux)))
     of_batch = estimator == "nls" or batch.model.with_split  # the observer has its iron at the stator
     return AxisResult(
