@@ -116,15 +116,6 @@ class ServiceProcess:
     def wait_energised(self, run: str) -> None:
         self.wait_for(run, lambda document: (document.get("live") or {}).get("output") == "on")
 
-    def wait_just_energised(self, run: str, age_s: float = 0.7) -> None:
-        """Energised by the run's own word, and by the simulator's log since no longer than `age_s`: a session's end is not near."""
-        self.wait_for(
-            run,
-            lambda document: (
-                (document.get("live") or {}).get("output") == "on" and time.time() - self.energised_since() < age_s
-            ),
-        )
-
     def wait_over(self, run: str, timeout_s: float = 300.0) -> dict[str, Any]:
         """The result, once its process has gone."""
         self.wait_for(run, lambda document: document.get("outcome") is not None, timeout_s)
@@ -145,12 +136,8 @@ class ServiceProcess:
 
     def is_energised(self) -> bool:
         """By the simulator's own log."""
-        return self.energised_since() > 0.0
-
-    def energised_since(self) -> float:
-        """Wall clock, s, by the simulator's own log; zero where it is not."""
-        lines = [line for line in self.truth() if line["event"] in ("energised", "de_energised")]
-        return float(lines[-1]["wall"]) if lines and lines[-1]["event"] == "energised" else 0.0
+        events = [line["event"] for line in self.truth() if line["event"] in ("energised", "de_energised")]
+        return bool(events) and events[-1] == "energised"
 
     def wait_dead(self, since_wall: float, timeout_s: float = 5.0) -> float:
         """Seconds from `since_wall` to zero volts by the simulator's log; zero where it was dead before."""

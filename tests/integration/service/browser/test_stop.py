@@ -2,10 +2,9 @@
 
 import re
 import time
-from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
 from tests.integration.service.conftest import PAGE_LOST_S
 from tests.support.service.browser import SLOW_MS, technician
@@ -18,26 +17,22 @@ DEAF = "window.WebSocket = class { constructor() { this.readyState = 0; } addEve
 """A browser whose WebSocket never opens: STOP goes by POST."""
 
 
-@pytest.fixture(scope="module")
-def unhurried(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
-    """Its simulator keeps real time: a voltage that has just come stays for 1.7 s and more, so that a press ends it."""
-    with ServiceProcess(tmp_path_factory.mktemp("unhurried"), speed="1.0", settings="axes_deg = [0]") as made:
-        made.start_simulator()
-        yield made
+PRESSES = 4
+"""A press may fall into the pause between two voltages, and ends the run there; so many in a row do not."""
 
 
-@pytest.mark.parametrize("way", ["WebSocket", "POST", "form"])
-def test_stop_ends_the_voltage_in_each_of_its_ways(unhurried, browser, way):
-    service, run = unhurried, unhurried.start_run()
+def pressed(service: ServiceProcess, browser: Browser, way: str) -> tuple[str, str]:
+    """The run that STOP ended while it was energised or paused, and what the page said to it; nothing without script."""
+    run, said = service.start_run(), ""
     with technician(browser, service, java_script_enabled=way != "form") as hand:
         if way == "POST":
             hand.page.add_init_script(DEAF)
         hand.go(f"/runs/{run}")
+        service.wait_energised(run)
         if way == "WebSocket":
             hand.wait_energised()  # its line is there
         else:
             hand.page.locator("#stop").hover()  # the hand is there: what is measured is the press, not the finding
-        service.wait_just_energised(run)
         began = time.time()
         if way == "WebSocket":
             hand.page.keyboard.press("Escape")
@@ -46,11 +41,23 @@ def test_stop_ends_the_voltage_in_each_of_its_ways(unhurried, browser, way):
             hand.page.mouse.up()
         assert service.wait_dead(began) <= ZERO_VOLTS_S
         if way != "form":
-            expect(hand.page.locator("#stopsub")).to_have_text(re.compile("confirmed after"), timeout=10_000)
+            answer = hand.page.locator("#stopsub")
+            expect(answer).to_have_text(re.compile("confirmed after|off already"), timeout=10_000)
+            said = answer.inner_text()
+    return run, said
+
+
+@pytest.mark.parametrize("way", ["WebSocket", "POST", "form"])
+def test_stop_ends_the_voltage_in_each_of_its_ways(service, browser, way):
+    for _ in range(PRESSES):
+        run, said = pressed(service, browser, way)
         result = service.wait_over(run)
         assert (result["outcome"], result["error"]["what"]) == ("aborted", "stopped by the operator")
         told = [entry for entry in service.client.get("/api/audit").json()["entries"] if entry["what"] == "STOP"]
         assert (told[0]["by"], told[0]["run"], told[0]["zero_volts"]) == (way, run, True)
+        if "off already" not in said:
+            break
+    assert way == "form" or "confirmed after" in said
 
 
 def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(browser, tmp_path):
@@ -86,14 +93,13 @@ def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(
 
 def test_a_page_that_has_lost_the_service_says_what_it_cannot_do(browser, tmp_path):
     """The service is killed: zero volts by the dead man; the page points at the emergency stop."""
-    with ServiceProcess(tmp_path, speed="1.0") as service, technician(browser, service) as hand:
+    with ServiceProcess(tmp_path) as service, technician(browser, service) as hand:
         service.start_simulator()
         # a service's first page costs most: on a busy host a run heard nothing of it for two seconds
         hand.go("/drives/simulator")
         run = service.start_run()
         hand.go(f"/runs/{run}")
         hand.wait_energised()
-        service.wait_just_energised(run)
         began = time.time()
         service.kill()
         assert service.wait_dead(began) <= ZERO_VOLTS_S
