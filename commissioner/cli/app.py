@@ -16,6 +16,7 @@ from commissioner.cli.groups.recordings import recordings_app
 from commissioner.cli.groups.runs import runs_app
 from commissioner.cli.help import Verbs, only
 from commissioner.cli.options import (
+    Axes,
     Diagnosed,
     Drive,
     Json,
@@ -74,9 +75,7 @@ def demo(
     ] = "default",
     speed: Annotated[str, typer.Option(help="Pace of the simulated inverter: 1, N or max.")] = "max",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated noise.")] = 1,
-    axes: Annotated[
-        str | None, typer.Option(help="Axis orientations in multiples of 30 electrical degrees, as 0,60,120.")
-    ] = None,
+    axes: Axes = None,
     write_back: Annotated[bool, typer.Option(help="Write the accepted parameters into the simulated drive.")] = True,
     diagnosis: Diagnosed = True,
     strict: Strict = False,
@@ -103,9 +102,7 @@ def check(
     profile: Profile = "simulated",
     motor: Motor = MOTOR,
     procedure: Procedure = None,
-    axes: Annotated[
-        str | None, typer.Option(help="Axis orientations in multiples of 30 electrical degrees, as 0,60,120.")
-    ] = None,
+    axes: Axes = None,
     json: Json = False,
 ) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
@@ -121,9 +118,7 @@ def run(
     drive: Drive,
     motor: Motor,
     profile: Profile = "simulated",
-    axes: Annotated[
-        str | None, typer.Option(help="Axis orientations in multiples of 30 electrical degrees, as 0,60,120.")
-    ] = None,
+    axes: Axes = None,
     write_back: Annotated[bool, typer.Option("--write-back", help="Write accepted parameters into the drive.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
     procedure: Procedure = None,

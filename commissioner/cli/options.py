@@ -30,6 +30,7 @@ Drive = Annotated[
     ),
 ]
 Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in config/drives or a .toml file.")]
+Axes = Annotated[str | None, typer.Option(help="Axis orientations in multiples of 30 electrical degrees, as 0,60,120.")]
 Procedure = Annotated[
     Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
 ]

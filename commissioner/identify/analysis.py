@@ -28,6 +28,7 @@ from commissioner.identify.estimate.axis import (
     Estimator,
     Matrix,
     carry_over,
+    do_legs_drive_beside,
     fit_axis,
     judge_axis,
     segments,
@@ -55,7 +56,7 @@ from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, RatedFlux, prior, rated_flux
-from commissioner.motor.space_vector import LEGS_ALIKE_DEG, is_aslant
+from commissioner.motor.space_vector import LEGS_ALIKE_DEG
 from commissioner.records import StandstillRecording
 
 COPPER_ZERO_DEGC = -234.5
@@ -311,7 +312,7 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
         f"axis {r.axis_deg:g} deg is no multiple of {LEGS_ALIKE_DEG:g} deg: what the inverter's legs lose drives a current beside it; standard "
         "errors are widened for it, `commissioner diagnose` knows it"
         for r in results
-        if is_aslant(r.axis_deg) and r.batch.model.leg is not None
+        if do_legs_drive_beside(r.axis_deg, r.batch)
     ]
     for result in results:
         if result.turning_rad_per_s:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -38,12 +37,9 @@ class Stream:
         self.is_over = False
         """The motor is de-energised: what the drive has kept has no age that matters."""
         self._inverter, self._cursor, self._watch = inverter, cursor, watch
-        self._began_s, self._asked_s, self._took_s = began_s, -math.inf, 0.0
+        self._clock = DriveClock(began_s, cursor.stream.sample_period_s)
+        self._asked_s, self._took_s = -math.inf, 0.0
         self._waiting: SampleBlock | None = None
-
-    @cached_property
-    def _clock(self) -> DriveClock:
-        return DriveClock(self._began_s, self._cursor.stream.sample_period_s)
 
     def next_block(self, longest_s: float) -> SampleBlock | None:
         """The next block with the largest age its last sample can have; None once the drive has ended the session.

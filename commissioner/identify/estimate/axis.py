@@ -48,8 +48,8 @@ class AxisResult:
     """One test: what the chosen estimator says, the batch fit beside it, and how far they are apart in standard
     errors.
 
-    `law_error` (4,): relative, what an estimator that stands for itself misses of the least squares on the same samples, and
-    what an inverter may do on an axis that is `aslant`. It is part of `covariance` (4, 4).
+    `law_error` (4,): relative, what an estimator that stands for itself misses of the least squares on the same samples,
+    what an inverter may do on an axis that is `aslant`, and a shaft that turned. It is part of `covariance` (4, 4).
     """
 
     axis_deg: float
@@ -236,10 +236,15 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     )
 
 
+def do_legs_drive_beside(axis_deg: float, batch: BatchFit) -> bool:
+    """Whether what the inverter's legs lose drives a current beside the axis: legs that lose something, an axis along which they do not lose
+    alike."""
+    return batch.model.leg is not None and is_aslant(axis_deg)
+
+
 def aslant_doubt(stretches: Sequence[Stretch], batch: BatchFit) -> float:
-    """Relative, of every value, where an inverter's losses drive a current beside the axis: the fit knows those of a current along it
-    only."""
-    if batch.model.leg is None or not is_aslant(stretches[0].axis_deg):
+    """Relative, of every value, where they do: the fit knows the losses of a current along the axis only."""
+    if not do_legs_drive_beside(stretches[0].axis_deg, batch):
         return 0.0
     along_a = np.concatenate([s.current_a for s in stretches])
     return ASLANT_SHARE * float(np.std(np.concatenate([s.cross_a for s in stretches])) / np.std(along_a))

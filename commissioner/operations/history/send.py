@@ -74,22 +74,20 @@ class _NotTaken(CommissionerError):
 
 def _try(folder: Path, service: _Service) -> Moved:
     """One run that is not taken holds up no other."""
+    if not (why := _misnamed(folder)):
+        try:
+            return _one(folder, service)
+        except _NotTaken as refusal:
+            why = f"{refusal.what}: {refusal.value}; {refusal.remedy}"
+    return Moved(folder.name, NOT_TAKEN, 0, 0, why)
+
+
+def _misnamed(folder: Path) -> str:
+    """What of the run has a name that no service takes; nothing of one as it was made."""
     if not re.search(RUN, folder.name):
-        return Moved(
-            folder.name, NOT_TAKEN, 0, 0, "its folder was given another name than a run has: call it as its run again"
-        )
-    if odd := [name for name in file_names(folder) if not re.search(FILE, name)]:
-        return Moved(
-            folder.name,
-            NOT_TAKEN,
-            0,
-            0,
-            f"a service takes no file called {odd[0]!r}: letters, digits, - _ . without spaces",
-        )
-    try:
-        return _one(folder, service)
-    except _NotTaken as refusal:
-        return Moved(folder.name, NOT_TAKEN, 0, 0, f"{refusal.what}: {refusal.value}; {refusal.remedy}")
+        return "its folder was given another name than a run has: call it as its run again"
+    odd = next((name for name in file_names(folder) if not re.search(FILE, name)), None)
+    return f"a service takes no file called {odd!r}: letters, digits, - _ . without spaces" if odd is not None else ""
 
 
 def _one(folder: Path, service: _Service) -> Moved:

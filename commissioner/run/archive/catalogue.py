@@ -96,14 +96,15 @@ def _id_of(root: Path, name: str) -> str:
 
 def _has_journal(path: Path) -> bool:
     """A run that lists show: one whose journal is gone is found by its name alone."""
-    try:
-        return (path / "journal.jsonl").is_file()
-    except OSError:
-        return False
+    return _has(path, "journal.jsonl")
 
 
 def _is_run(path: Path) -> bool:
+    return _has(path, "journal.jsonl", "request.json")
+
+
+def _has(path: Path, *one_of: str) -> bool:
     try:
-        return (path / "journal.jsonl").is_file() or (path / "request.json").is_file()
+        return any((path / name).is_file() for name in one_of)
     except OSError:
         return False

@@ -84,17 +84,19 @@ class Texts:
             return whole
         if len(parts := said.split("; ")) > 1 and all(map(self.knows, parts)):
             return "; ".join(map(self.tell, parts))
-        for pattern, translation in self._catalogue.sentences:
-            if (found := pattern.fullmatch(said)) is not None:
-                return translation % {k: v if _is_name(k) else self._value(v) for k, v in found.groupdict().items()}
-        return said
+        translation, gaps = self._known(said)
+        return translation % {k: v if _is_name(k) else self._value(v) for k, v in gaps.items()} if translation else said
 
     def seen(self, what: str, value: Any, unit: str = "") -> str:
         """The value of a refusal `what`, as `short` says it; one that the sentence names is no word to translate."""
-        found = (pattern.fullmatch(what) for pattern, _ in self._catalogue.sentences)
-        names = next((f.groupdict() for f in found if f is not None), {})
-        is_name = any(_is_name(k) and value in (v, v.strip("'")) for k, v in names.items())
+        _, gaps = self._known(what)
+        is_name = any(_is_name(k) and value in (v, v.strip("'")) for k, v in gaps.items())
         return str(value) if is_name else self.short(value, unit)
+
+    def _known(self, said: str) -> tuple[str, dict[str, str]]:
+        """The translation of the sentence that this is, and what the core filled in; nothing of one that the catalogue lacks."""
+        found = ((pattern.fullmatch(said), translation) for pattern, translation in self._catalogue.sentences)
+        return next(((translation, match.groupdict()) for match, translation in found if match is not None), ("", {}))
 
     def person(self, name: str) -> str:
         """Who did it; whoever sits at this computer without an account is called by what they do, the service by what it is."""

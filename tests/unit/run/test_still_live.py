@@ -21,6 +21,8 @@ from commissioner.safety import commands as ask
 from commissioner.safety.limits import SafetyFacts
 from commissioner.settings import load_motor
 
+EVERY_SAMPLE = SimpleNamespace(stream=SimpleNamespace(averaged=1, sample_period_s=5e-4))
+
 
 class Drive:
     """Stands for an inverter whose status goes on saying `operation enabled`, from its n-th switching off on."""
@@ -37,7 +39,7 @@ class Drive:
         return DisarmReport(is_dead, "switch-on disabled" if is_dead else "operation enabled", (), not is_dead)
 
     def enable(self):
-        return None
+        return EVERY_SAMPLE
 
 
 @pytest.fixture
@@ -163,8 +165,7 @@ def test_a_stream_without_samples_ends_within_the_watchdogs_time(folder):
         def fetch(self, cursor, most):
             return SimpleNamespace(cursor=cursor, block=None, has_ended=False)
 
-    every_sample = SimpleNamespace(stream=SimpleNamespace(averaged=1))
-    stream = Stream(Silent(live_from=9), every_sample, time.monotonic(), sensors=None, watch=None)
+    stream = Stream(Silent(live_from=9), EVERY_SAMPLE, time.monotonic(), sensors=None, watch=None)
     began = time.monotonic()
     with pytest.raises(DriveFault, match="no samples"):
         stream.next_block(0.05)
