@@ -239,7 +239,7 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
 def do_legs_drive_beside(axis_deg: float, batch: BatchFit) -> bool:
     """Whether what the inverter's legs lose drives a current beside the axis: legs that lose something, an axis along which they do not lose
     alike."""
-    return batch.model.leg is not None and is_aslant(axis_deg)
+    return is_aslant(axis_deg) and batch.model.leg is not None
 
 
 def aslant_doubt(stretches: Sequence[Stretch], batch: BatchFit) -> float:
