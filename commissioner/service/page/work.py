@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
 from commissioner.run.archive.documents import damaged, identified, origin_of
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -50,6 +51,8 @@ ENDED = View("work/ended.html", "The run has ended", 5)
 RESULT = View("work/result.html", "Result", 6)
 DONE = replace(RESULT, step=8)
 WRITE = View("work/write.html", "What would be written into the drive", 7)
+JOURNALLED: Mapping[Act, str] = {"write-back": "parameters_written", "restore": "snapshot_restored"}
+"""Records of a run's journal that say what was written into its drive."""
 WRITTEN = View("work/written.html", "Written, read back and stored", 8)
 
 
@@ -385,6 +388,8 @@ async def _table(request: Request, run: str, what: Act) -> Response:
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
     place = _place(parts, run)
+    if what == "write-back" and parts.archive.find(run).standing == "commissioned":
+        return go(f"/runs/{run}/{what}/done")
     try:
         table = await plan(parts, run, what)
     except Refusal as refusal:
@@ -397,18 +402,30 @@ async def _written(request: Request, run: str, what: Act) -> Response:
     parts = parts_of(request)
     place = _place(parts, run)
     try:
-        done = await act(parts, run, what, fields.get("token", ""), who)
+        await act(parts, run, what, fields.get("token", ""), who)
     except Refusal as refusal:
         return refused(request, refusal, place, f"/runs/{run}/{what}")
+    return go(f"/runs/{run}/{what}/done")
+
+
+@router.get("/runs/{run}/{what}/done")
+async def written(request: Request, run: str, what: Act) -> Response:
+    """What was written last, as the run's journal has it: looked at again, nothing is written again."""
+    enter(request)
+    parts = parts_of(request)
+    lines = await asyncio.to_thread(read_journal, parts.archive.find(run).folder / "journal.jsonl")
+    done = next((line for line in reversed(lines) if line["kind"] == JOURNALLED[what]), None)
+    if done is None:
+        return go(f"/runs/{run}")
     return render(
         request,
         WRITTEN,
-        place,
+        _place(parts, run),
         run=run,
         what=what,
-        done=done.get("report") or done,
+        done=done["record"],
         units=_units(drive_of(parts, run)),
-        who_wrote=who.person,
+        written_utc=done["utc"],
         motor=str(origin_of(parts.archive.request(run)).get("motor", "")),
     )
 

@@ -129,6 +129,8 @@ def test_report_and_exports(service, finished):
 
 
 def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(service, finished):
+    nothing_yet = httpx.get(f"{service.url}/runs/{finished}/write-back/done")
+    assert nothing_yet.headers["location"] == f"/runs/{finished}"
     table = service.client.get(f"/api/runs/{finished}/write-back").json()
     assert {"register", "now", "will_be", "unit", "convention"} <= set(table["rows"][0])
     is_problem(service.client.post(f"/api/runs/{finished}/write-back", json={"token": "another"}), 409)
@@ -137,6 +139,10 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
     assert [w["read_back"] for w in done["report"]["written"]] == pytest.approx(
         [r["will_be"] for r in table["rows"]], rel=1e-6
     )
+    for _look in range(2):  # a page looked at again writes nothing again
+        page = httpx.get(f"{service.url}/runs/{finished}/write-back", follow_redirects=True)
+        assert page.url.path.endswith("/write-back/done")
+        assert "Written and read back" in page.text
     again = service.client.get(f"/api/runs/{finished}/write-back")
     assert "nothing to write" in is_problem(again, 409)["title"]
     old = service.client.get(f"/api/runs/{finished}/restore").json()
@@ -145,6 +151,7 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
         service.client.post(f"/api/runs/{finished}/restore", json={"token": old["token"]}).json()["outcome"]
         == "restored"
     )
+    assert "Restored and read back" in httpx.get(f"{service.url}/runs/{finished}/restore/done").text
     page = (service.runs / finished / "report.html").read_text("utf-8")
     assert page.index("Restored on ") < page.index("Written on ") < page.index("SIM-INV-7A")
     told = [entry["what"] for entry in service.client.get("/api/audit").json()["entries"]]

@@ -76,6 +76,8 @@ def test_a_whole_commissioning_by_clicks(service, browser, language):
             expect(hand.page.locator("main")).to_contain_text(hand.words[seen], timeout=SLOW_MS)
             judge_view(hand, language, english)
             if seen == "written":
+                hand.page.reload()
+                expect(hand.page.locator("main")).to_contain_text(hand.words[seen])
                 kept = {"en": "Measured and written", "de": "Gemessen und geschrieben"}[language]
                 expect(hand.page.locator("#small")).to_contain_text(kept)
         hand.go(f"/runs/{run}")
