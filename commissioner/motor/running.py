@@ -1,4 +1,4 @@
-"""The fifth-order model of a running machine, in a frame that turns with the supply.
+"""The T circuit of a running machine: its impedance, and the slip that belongs to a power, a current or a lag.
 
 C. J. Schantz, S. B. Leeb, "Self-Sensing Induction Motors for Condition Monitoring", equations (4)-(9), with the signs
 corrected: i_s = (L_m lambda_r - L_ar lambda_s) / D and i_r = (L_m lambda_s - L_as lambda_r) / D, D = L_m^2 - L_as L_ar < 0.
@@ -10,14 +10,10 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from commissioner.compiled import njit
 from commissioner.motor.circuit import InverseGamma, from_t_model, to_t_model
 from commissioner.motor.nameplate import Nameplate
-
-Vector = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -148,48 +144,3 @@ def from_nameplate(plate: Nameplate) -> TCircuit:
     main = -1 / (w * min((admittance - branch).imag, -0.05 * abs(admittance)))
     return TCircuit(float(resistance), float(rotor), float(leakage), float(leakage), float(main))
 
-
-@njit()
-def resimulate(
-    circuit: tuple[float, float, float, float, float],
-    voltage_dq_v: Vector,
-    supply_rad_per_s: NDArray[np.float64],
-    electrical_speed_rad_per_s: NDArray[np.float64],
-    sample_period_s: float,
-    stator_flux_wb: complex,
-    rotor_flux_wb: complex,
-) -> Vector:
-    """Stator current of (4), (5) driven by the voltage with the rotor speed enforced; fourth-order Runge-Kutta.
-
-    `circuit` is (R_s, R_r, L_as, L_ar, L_m). Signals `(n,)` at the sample times, linear in between; the fluxes are the
-    state at the first sample. Out: `(n,)` complex current in the same frame.
-    """
-    r_s, r_r, l_s, l_r, l_m = circuit
-    d = l_m * l_m - l_s * l_r
-    n = voltage_dq_v.shape[0]
-    out = np.empty(n, dtype=np.complex128)
-    a, b = stator_flux_wb, rotor_flux_wb
-    h = sample_period_s
-    for k in range(n):
-        out[k] = (l_m * b - l_r * a) / d
-        if k == n - 1:
-            break
-        v0, v1 = voltage_dq_v[k], voltage_dq_v[k + 1]
-        e0, e1 = supply_rad_per_s[k], supply_rad_per_s[k + 1]
-        w0, w1 = electrical_speed_rad_per_s[k], electrical_speed_rad_per_s[k + 1]
-        sum_a, sum_b = 0j, 0j
-        ka, kb = 0j, 0j
-        for stage in range(4):
-            part = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-            x, y = a + part * h * ka, b + part * h * kb
-            v = v0 + part * (v1 - v0)
-            e = e0 + part * (e1 - e0)
-            w = w0 + part * (w1 - w0)
-            ka = v - r_s * (l_m * y - l_r * x) / d - 1j * e * x
-            kb = 1j * (w - e) * y - r_r * (l_m * x - l_s * y) / d
-            weight = 1.0 if stage in (0, 3) else 2.0
-            sum_a += weight * ka
-            sum_b += weight * kb
-        a += h / 6 * sum_a
-        b += h / 6 * sum_b
-    return out

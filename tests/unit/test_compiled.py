@@ -1,13 +1,16 @@
 """A cached kernel goes when a source it may have been made of is younger; the others stay."""
 
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from commissioner.compiled import forget_stale_kernels
 
+HOUSE = Path(__file__).parents[2]
 NAMES = ("kernels/one.py", "kernels/two.py", "numbers.py")
 
 
@@ -44,16 +47,25 @@ def test_a_folder_without_a_cache_is_left_alone(tmp_path):
     forget_stale_kernels(str(tmp_path / "kernels"), "numbers.py")
 
 
-@pytest.mark.parametrize(
-    "modules", ["commissioner.identify.batch.output_error, commissioner.motor.running", "sim.physics.running"]
-)
-def test_without_a_folder_to_write_kernels_are_compiled_anew_and_no_import_fails(modules):
+def compiling(package):
+    """Modules of a package with anything that is compiled."""
+    return [
+        ".".join(path.relative_to(HOUSE).with_suffix("").parts)
+        for path in sorted((HOUSE / package).rglob("*.py"))
+        if re.search(r"import .*\b(njit|kernel)\b", path.read_text("utf-8"))
+    ]
+
+
+@pytest.mark.parametrize("package", ["commissioner", "sim"])
+def test_without_a_folder_to_write_kernels_are_compiled_anew_and_no_import_fails(package):
     """As in a container whose root is read-only: numba finds no place for its cache."""
+    modules = compiling(package)
+    assert len(modules) > 3
     script = (
         "import tempfile\n"
         "def refuse(*a, **k): raise OSError(30, 'Read-only file system')\n"
         "tempfile.TemporaryFile = refuse\n"
-        f"import {modules}\n"
+        f"import {', '.join(modules)}\n"
         "from numba import njit\n"
         "try:\n    njit(cache=True)(refuse)\nexcept RuntimeError:\n    print('no cache, imported')\n"
     )

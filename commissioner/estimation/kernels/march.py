@@ -9,15 +9,14 @@ DOI 10.1137/S003614459631241X) are exact to the last digit, from the same lines.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from commissioner.compiled import forget_stale_kernels
+from commissioner.compiled import forget_stale_kernels, njit
 from commissioner.estimation.numbers import AT
 
 forget_stale_kernels(__file__.replace("\\", "/").rpartition("/")[0], "numbers.py")
 
 FAST = {"reassoc", "arcp", "contract", "nsz"}
-_kernel = njit(cache=True, error_model="numpy", fastmath=FAST, nogil=True)
+_kernel = njit(error_model="numpy", fastmath=FAST, nogil=True)
 _inlined = njit(inline="always", error_model="numpy", fastmath=FAST)
 
 STATES = 10

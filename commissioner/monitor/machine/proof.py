@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from commissioner.estimation.driven import driven
 from commissioner.monitor.intake.findings import Audited
 from commissioner.monitor.machine.fit import Problem
 from commissioner.monitor.machine.inversion import basis_of
 from commissioner.monitor.machine.waveform import Solved
 from commissioner.monitor.signals.averaging import Comb
 from commissioner.monitor.signals.supply import TurningFrame, Vector
-from commissioner.motor.running import TCircuit, resimulate
 from commissioner.records import Signal
 
 LENGTH_S = 1.0
@@ -62,23 +62,20 @@ def prove(
     every = np.arange(audited.current_a.size) * period
     near = slice(max(first - 8, 0), first + count + 8)
     measured = CubicSpline(every[near], audited.current_a[near])(time + delay_s) * turn
-    voltage = audited.voltage_v[window] * turn
     phases = {p: np.interp(time, time_part, comb.phase_rad) for p, comb in enumerate(combs)}
     basis = basis_of(problem.lines, phases, count)
     speed = solved.speed.mean_rad_per_s + 2 * np.real(basis[:, problem.on.positive] @ solved.speed.amplitude_rad_per_s)
     circuit = solved.circuit
-    rotor = complex(basis[0] @ solved.state.flux_wb)
-    current = complex(basis[0] @ problem.lines.current_a)
-    stator = (circuit.magnetizing_inductance_h * rotor - circuit.determinant_h2 * current) / circuit.rotor_inductance_h
-    simulated = resimulate(
-        _numbers(circuit),
-        voltage,
-        audited.supply.frequency_rad_per_s(time),
+    flux = complex(basis[0] @ solved.state.flux_wb) * circuit.magnetizing_inductance_h / circuit.rotor_inductance_h
+    current = driven(
+        circuit.as_inverse_gamma(),
+        audited.voltage_v[window],
         problem.pole_pairs * speed,
         period,
-        stator,
-        rotor,
+        complex(basis[0] @ problem.lines.current_a) / turn[0],
+        flux / turn[0],
     )
+    simulated = current * turn
     keep = slice(int(SETTLING_S / length * count), count)
     error = simulated[keep] - measured[keep]
     whole = float(np.sqrt(np.mean(np.abs(error) ** 2) / np.mean(np.abs(measured[keep]) ** 2)))
@@ -100,12 +97,3 @@ def _periodic(basis: Vector, error: Vector, measured: Vector) -> float:
     power = np.sum(np.abs(fit) ** 2, axis=0) - np.abs(fit[0]) ** 2
     return float(np.sqrt(power[0] / power[1])) if count > basis.shape[1] and power[1] > 0 else float("nan")
 
-
-def _numbers(circuit: TCircuit) -> tuple[float, float, float, float, float]:
-    return (
-        circuit.stator_resistance_ohm,
-        circuit.rotor_resistance_ohm,
-        circuit.stator_inductance_h,
-        circuit.rotor_inductance_h,
-        circuit.magnetizing_inductance_h,
-    )

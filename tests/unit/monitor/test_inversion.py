@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commissioner.estimation.driven import driven
 from commissioner.monitor.machine.estimate import band_weights, speed_lines
 from commissioner.monitor.machine.fit import PRIOR_FROM_NAMEPLATE, Start, fit, pose
 from commissioner.monitor.machine.inversion import SpeedLines, complex_speed, rotor_state, torque_of, torus
@@ -19,7 +20,6 @@ from commissioner.motor.running import (
     equal_leakages,
     from_nameplate,
     pull_out_slip,
-    resimulate,
     slip_at_current,
     slip_at_power,
     stator_impedance,
@@ -149,14 +149,13 @@ def test_a_band_near_standstill_in_stator_coordinates_is_trusted_less() -> None:
     assert all(abs(weight[h] - 0.5) < weight[2] - 0.5 for h in (4, 5, 6, 8))
 
 
-def test_resimulation_at_constant_speed_settles_to_the_steady_state() -> None:
-    slip = 0.03
+def test_driven_at_constant_speed_the_machine_settles_to_the_steady_state() -> None:
+    slip, count, period_s = 0.03, 8000, 1.25e-4
     current, _ = steady(slip)
-    count = 8000
+    turn = np.exp(1j * SUPPLY * period_s * np.arange(count))
     speed = np.full(count, SUPPLY * (1 - slip))
-    numbers = (3.7, 2.296, MACHINE.stator_inductance_h, MACHINE.rotor_inductance_h, MACHINE.magnetizing_inductance_h)
-    out = resimulate(numbers, np.full(count, VOLTAGE + 0j), np.full(count, SUPPLY), speed, 1.25e-4, 0j, 0j)
-    assert out[-1] == pytest.approx(current, rel=1e-4)
+    out = driven(MACHINE.as_inverse_gamma(), VOLTAGE * turn, speed, period_s, 0j, 0j)
+    assert out[-1] / turn[-1] == pytest.approx(current, rel=1e-4)
 
 
 def test_the_plate_s_circuit_draws_the_rated_current_at_the_rated_power_factor() -> None:
