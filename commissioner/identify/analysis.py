@@ -51,6 +51,7 @@ from commissioner.identify.intake.alignment import (
     shifted,
 )
 from commissioner.identify.intake.audit import Audit, audit
+from commissioner.identify.intake.dc_link import LinkCourse, link_course
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.staircase import InverterError
@@ -95,6 +96,7 @@ class Identification:
     remarks: tuple[str, ...]
     fits: tuple[AxisFit, ...] = ()
     """Of the tests, each by itself."""
+    link: LinkCourse | None = None
 
     @property
     def delay_s(self) -> tuple[float, float]:
@@ -139,7 +141,9 @@ def identify(
     require_volts(examined, plate)
     period_s = recording.sample_period_s
     require_tones(examined, period_s)
-    first, *others = _by_test(examined)
+    tests = _by_test(examined)
+    first, *others = tests
+    link = link_course(recording, tests)
 
     def one(stretches: Sequence[Stretch]) -> AxisFit:
         done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier else None
@@ -164,7 +168,9 @@ def identify(
     )
     require_near(shift)
     temperature = winding_temperature_degc or _temperature(recording)
-    return replace(_summary(results, examined, plate, estimator, temperature, assumption, shift), fits=as_fitted)
+    found = _summary(results, examined, plate, estimator, temperature, assumption, shift)
+    of_link = (link.remark,) if link is not None and link.remark else ()
+    return replace(found, fits=as_fitted, link=link, remarks=(*found.remarks, *of_link))
 
 
 def _aligned(

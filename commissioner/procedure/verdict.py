@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -10,6 +11,7 @@ import numpy as np
 
 from commissioner.identify.analysis import Identification, axis_at
 from commissioner.identify.estimate.turning import turning_doubt
+from commissioner.identify.intake.dc_link import LinkCourse
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
 from commissioner.motor.plate_match import PlateMatch, plate_match, sure_mismatch
@@ -57,7 +59,9 @@ _LIMIT = {
     "leakage_inductance_h": "leakage_std_percent",
     "magnetizing_inductance_h": "magnetizing_std_percent",
 }
-
+FOLLOWS = 0.5
+"""Of what the DC link moved by: what two tests must have seen of it, and what their values do not follow it by on a drive that
+corrects its voltage. One that does not makes them follow by all of it."""
 
 Values = Mapping[str, Quantity]
 
@@ -67,7 +71,7 @@ class Evidence:
     """What the verdict is reached from: combined values, each test's values, each test's batch fit beside them, and each
     test's values at the flux all of them reached. `unlike`: why the axes differ more than by chance, in words, and by how much, relative; `lost_samples` of all tests;
     `guard_acted`: the flux guard took the amplitude back; `beyond_time`: names that a longer test would not make surer; `turned`: tests
-    in which the shaft turned, by what speed (electrical, rad/s), and what that makes doubtful of every value, relative."""
+    in which the shaft turned, by what speed (electrical, rad/s), and what that makes doubtful of every value, relative; `link`: what the DC link did, None where nobody saw it."""
 
     combined: Values
     axes: tuple[tuple[float, Values], ...]
@@ -78,6 +82,7 @@ class Evidence:
     guard_acted: bool = False
     beyond_time: frozenset[str] = frozenset()
     turned: tuple[tuple[float, float, float], ...] = ()
+    link: LinkCourse | None = None
 
 
 def evidence_of(identification: Identification) -> Evidence:
@@ -98,6 +103,7 @@ def evidence_of(identification: Identification) -> Evidence:
             for a in axes
             if a.turning_rad_per_s
         ),
+        link=identification.link,
     )
 
 
@@ -111,6 +117,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
         *_another_motor(evidence.combined, plate),
         *_outside(evidence.combined, prior(plate)),
         *_turned(evidence, acceptance),
+        *_link_moved(evidence, acceptance),
         *_disagreements(evidence, acceptance),
         *_uncertain(evidence, acceptance),
         *_spread(evidence, acceptance),
@@ -157,6 +164,32 @@ def _turned(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
                 f"{acceptance.resistance_std_percent:g} %",
                 "hold the shaft still: close the brake or take the load off, and test again",
             )
+
+
+def _link_moved(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
+    link = evidence.link
+    if link is None or 100 * link.doubt <= acceptance.resistance_std_percent or _is_corrected(link, evidence):
+        return
+    yield Objection(
+        "the DC link moved between the tests",
+        f"{link.lowest_v:.4g} ... {link.highest_v:.4g} V, which makes every value uncertain by {100 * link.doubt:.2g} %",
+        f"{acceptance.resistance_std_percent:g} %",
+        "test again on a steady supply, with nothing heavy switched on it meanwhile, or have the drive correct its voltage for the link",
+    )
+
+
+def _is_corrected(link: LinkCourse, evidence: Evidence) -> bool:
+    """Whether the drive corrects its voltage for the link: two tests saw most of what it moved by, and their values did not follow."""
+    tests = [values for _, values in evidence.at_one_flux or evidence.axes]
+    seen = sorted((volts, k) for k, volts in enumerate(link.tests_v) if volts > 0.0)  # NaN is none
+    if len(seen) < 2 or len(tests) != len(link.tests_v):
+        return False
+    (low_v, low), (high_v, high) = seen[0], seen[-1]
+    moved = math.log(high_v / low_v)
+    if moved < FOLLOWS * math.log(link.highest_v / link.lowest_v):
+        return False
+    follows = [math.log(tests[low][name].value / tests[high][name].value) for name in PARAMETERS]
+    return float(np.median(follows)) < FOLLOWS * moved
 
 
 def _disagreements(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:

@@ -139,9 +139,7 @@ class Runner:
 
     def _granted(self, wish: StopAsked) -> Aborted:
         self._progress.granted = wish
-        return Aborted(
-            "stopped by the operator", step="run", value=str(wish), limit="no stop", remedy="start again when ready"
-        )
+        return Aborted(wish.what, step="run", value=str(wish), limit="no stop", remedy=wish.remedy)
 
     def _carry_out(self, command: ask.Command) -> object:
         refusal = permit(command, self._progress.facts, self._bounds)

@@ -38,6 +38,16 @@ STEPS = 2.0
 and the same beside a current of 0.7 A, and the run ended as a fault."""
 NAMES = ("u", "v", "w")
 CHECK = "check the current sensors, their plugs, order, sign and scale in the drive, and the motor cable"
+OPEN_SHARE = 0.1
+"""Of the axis current: what a phase that carries none still shows, its sensor's noise and offset aside."""
+QUIET = 3.0
+"""Standard deviations of its noise that the mean square of a phase without current, or of all three's sum, may show."""
+FLOWED, GONE_S = 60.0, 0.12
+"""Standard deviations of its noise from which a current surely flows. One that after such a current stays below `SIGMAS` of them for so long,
+beside as much voltage, has stopped: where it changes its sign, it stays there for 0.05 s at half a hertz."""
+AS_MUCH = 0.95
+"""Of the voltage, in the root mean square, that drove such currents: what an inverter loses may take all of a smaller one."""
+CABLE = "isolate the supply, then check motor cable, terminals and contactor"
 TURNING = "see that the shaft stands still, for one that turns makes currents beside the axis, too; "
 
 
@@ -60,6 +70,10 @@ class SensorWatch:
     _claimed: tuple[int, float] | None = None
     _step_a: float = 0.0
     """The smallest difference that a sensor has shown: the step of a coarse converter, next to nothing of any other."""
+    _drove: tuple[float, int] = (0.0, 0)
+    """Of the windows in which a current surely flowed: the sum of their mean squared voltages, and how many they are."""
+    _gone_s: float = 0.0
+    """For so long no current has flowed beside as much voltage."""
 
     def claim(self, status: DriveStatus) -> None:
         """The drive says how large its newest sample's largest phase current is."""
@@ -100,7 +114,27 @@ class SensorWatch:
         volts = np.concatenate([part for _, part in self._window])
         self._window.clear()
         self._step_a = _smallest_step(seen, self._step_a)
-        return _misfit(seen, volts, self._zero, block.axis_deg, self._step_a)
+        stopped = self._stopped(seen, volts, self._zero, volts.size * block.sample_period_s)
+        return stopped or _misfit(seen, volts, self._zero, block.axis_deg, self._step_a)
+
+    def _stopped(self, seen: Signal, voltage_v: Signal, zero: _Zero, seconds: float) -> StopReason | None:
+        """A window in which no current flows any more, after others."""
+        size_a = max(_rms(phase) for phase in seen - zero.offset_a[:, None])
+        noise_a, volts_v = float(np.max(zero.noise_a)), _rms(voltage_v)
+        square, windows = self._drove
+        if size_a > FLOWED * noise_a + self._step_a:
+            self._drove = square + volts_v**2, windows + 1
+        if size_a > SIGMAS * noise_a + self._step_a or not windows:
+            self._gone_s = 0.0
+            return None
+        drove_v = math.sqrt(square / windows)
+        self._gone_s += seconds if volts_v >= AS_MUCH * drove_v else 0.0
+        if self._gone_s < GONE_S:
+            return None
+        return StopReason(
+            f"no current flows any more, although {volts_v:.3g} V are applied", size_a, f"a current, as {drove_v:.3g} V drove before",
+            CABLE, unit="A",
+        )  # fmt: skip
 
     def _learn(self, block: SampleBlock, phases: Signal) -> None:
         """Offsets and noise, from the time before the first volt."""
@@ -125,7 +159,7 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
     cosines = np.array(phase_cosines(axis_deg))[: seen.shape[0]]
     current = seen - zero.offset_a[:, None]
     along = cosines @ current / float(cosines @ cosines)
-    size_a, noise_a = math.sqrt(float(np.mean(np.square(along)))), SIGMAS * float(np.max(zero.noise_a))
+    size_a, noise_a = _rms(along), SIGMAS * float(np.max(zero.noise_a))
     top_v, moved_v = peak(voltage_v), float(np.ptp(voltage_v))
     moves = min(moved_v, top_v) * size_a * np.abs(cosines) > STEPS * step_a * top_v
     still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & moves
@@ -138,10 +172,31 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
     allowed = MISFIT * size_a + noise_a + step_a
     if float(np.max(rest)) <= allowed:
         return None
+    without = _open_phase(current, cosines, size_a, QUIET / SIGMAS * noise_a + step_a)
+    if without is not None:
+        return StopReason(
+            f"phase {NAMES[without]} carries no current, what flows goes through the other two: it is open", _rms(current[without]),
+            f"{abs(cosines[without]) * size_a:.3g} A", CABLE, unit="A",
+        )  # fmt: skip
     return _distrusted(
         f"the current sensor of phase {_culprit(current, cosines)} does not follow the test axis",
         float(np.max(rest)), f"at most {allowed:.3g} A beside the axis", TURNING + CHECK,
     )  # fmt: skip
+
+
+def _open_phase(current: Signal, cosines: Signal, size_a: float, noise_a: float) -> int | None:
+    """The phase that carries nothing although the axis asks it to, while the other two carry one current, there and back; a sensor that is
+    silent leaves two that are no negatives of each other. None where there are two sensors: they cannot tell."""
+    if len(cosines) < 3 or _rms(current.sum(axis=0)) > OPEN_SHARE * size_a + noise_a:
+        return None
+    phase = int(np.argmin([_rms(one) for one in current]))
+    carries_a, asked_a = _rms(current[phase]), abs(float(cosines[phase])) * size_a
+    is_open = carries_a <= OPEN_SHARE * size_a + noise_a < asked_a
+    return phase if is_open else None
+
+
+def _rms(signal: Signal) -> float:
+    return math.sqrt(float(np.mean(np.square(signal))))
 
 
 def _culprit(current: Signal, cosines: Signal) -> str:

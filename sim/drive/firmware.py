@@ -18,7 +18,7 @@ from sim.drive.live import COUNTS_PER_LSB, crc16, run_interrupts
 from sim.drive.memory import Memory
 from sim.drive.parameters import ParameterSet
 from sim.drive.registers import Registers
-from sim.drive.samples import LINK_STEP_V, VOLTAGE_STEP_V, SampleRing
+from sim.drive.samples import VOLTAGE_STEP_V, SampleRing, link_step_v
 from sim.drive.states import Setup, State, Trip
 from sim.physics import layout as at
 from sim.physics.kernel import coast
@@ -40,7 +40,7 @@ def warm_up(plant: Plant, drive_map: DriveMap) -> None:
     run_interrupts(1, x, p, e, s, ring.c, white, ring.history, ring.means, ring.ring, ring.flags, trip)
     coast(x, p, 0.001)
     crc16(np.zeros(1, np.int64))
-    ring.window(0, 1, 0, 0.0, is_running=False)
+    ring.window(0, 1, 0, 0, is_running=False)
 
 
 class Firmware:
@@ -61,6 +61,7 @@ class Firmware:
         self.wall_clock = wall_clock
         self.p, self.s = pack(plant)
         self.x = fresh_state(self.p)
+        self.link_step_v = link_step_v(plant.power_stage.link_v)
         self.noise = np.random.default_rng([seed, 1])
         self.link_noise = np.random.default_rng([seed, 2])
         self.seed = seed
@@ -373,7 +374,7 @@ class Firmware:
     def link_now(self) -> float:
         """Measured DC link (V)."""
         noise = self.s[at.S_LINK_NOISE_V] * self.link_noise.standard_normal()
-        return float(round((self.x[at.X_LINK] + noise) / LINK_STEP_V) * LINK_STEP_V)
+        return float(round((self.x[at.X_LINK] + noise) / self.link_step_v) * self.link_step_v)
 
     @property
     def current_scale_a(self) -> float:

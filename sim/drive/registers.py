@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sim.drive.claim import UNCOUNTED
 from sim.drive.drive_map import Item
 from sim.drive.parameters import PARAMETERS
-from sim.drive.samples import LINK_STEP_V, VOLTAGE_STEP_V
+from sim.drive.samples import VOLTAGE_STEP_V
 from sim.drive.states import Answer
 from sim.physics import layout as at
 
@@ -110,7 +110,7 @@ class Registers:
                 int(self.drive.values["window_index"]),
                 fitting,
                 self.drive.session,
-                self.drive.x[at.X_LINK],
+                round(self.drive.x[at.X_LINK] / self.drive.link_step_v),
                 is_running=self.drive.is_energised,
             )
         return self.window[skip : skip + count]
@@ -152,7 +152,7 @@ def status_values(drive: Firmware) -> dict[str, Any]:
         "owner_left_s": drive.claim.left_s(drive.now()),
         "current_scale_a": drive.current_scale_a,
         "voltage_scale_v": VOLTAGE_STEP_V,
-        "dc_link_scale_v": LINK_STEP_V,
+        "dc_link_scale_v": drive.link_step_v,
         "ring_capacity": drive.setup.ring_capacity,
         "current_full_scale_a": drive.plant.sensors.full_scale_a,
         "rated_power_w": plate.rated_power_w,

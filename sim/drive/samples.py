@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,13 @@ from sim.drive.live import CHANNELS, HISTORY, check_sum, copy_samples
 from sim.physics import layout as at
 
 VOLTAGE_STEP_V = 0.01
-LINK_STEP_V = 0.02
+LINK_STEP_V, LINK_ROOM = 0.02, 1.15
+"""V per count of the link's signed word, which so ends at 655 V; what it must hold of the nominal link."""
+
+
+def link_step_v(nominal_v: float) -> float:
+    """V per count of this link: a multiple of the finest where the word would wrap, as at the 975 V of a 690 V drive."""
+    return LINK_STEP_V * max(1, math.ceil(LINK_ROOM * nominal_v / (0x7FFF * LINK_STEP_V)))
 
 
 class SampleRing:
@@ -50,18 +57,18 @@ class SampleRing:
         data = min(registers, self.map.window_words) - self.map.window_header_words
         return max(data, 0) // len(self.channels)
 
-    def window(self, wanted: int, samples: int, session: int, link_v: float, *, is_running: bool) -> list[int]:
+    def window(self, wanted: int, samples: int, session: int, link_count: int, *, is_running: bool) -> list[int]:
         """Header, CRC and data from sample `wanted` on; the oldest kept sample instead where that one is gone."""
         oldest = max(self.first_kept, self.produced - self.capacity)
         self.overruns += max(0, oldest - self.next_unread)
         first = max(wanted, oldest)
         first, count = self._around_gaps(first, max(0, min(samples, self.produced - first)))
         self.next_unread = max(self.next_unread, oldest, first + count)
-        link = round(link_v / LINK_STEP_V) & 0xFFFF
         words, header = np.zeros(self.map.window_words, np.int64), self.map.window_header_words
         seen = int(copy_samples(self.ring, self.flags, first, count, self.mask, words[header:]))
         flags = seen | self._flags(first + count, was_overrun=wanted < oldest, is_running=is_running)
-        words[: header - 1] = session, first >> 16 & 0xFFFF, first & 0xFFFF, count, self.mask, flags, link
+        place = (first >> 16 & 0xFFFF, first & 0xFFFF)
+        words[: header - 1] = session, *place, count, self.mask, flags, link_count & 0xFFFF
         words[header - 1] = check_sum(words, header, count * len(self.channels))
         return words.tolist()
 

@@ -402,3 +402,17 @@ def test_same_seed_same_samples_however_time_is_cut():
     for _ in range(300):
         cut.advance(0.001)
     np.testing.assert_array_equal(whole.samples.ring, cut.samples.ring)
+
+
+@pytest.mark.parametrize(
+    ("nominal_v", "step_v"), [(325.0, 0.02), (540.0, 0.02), (565.0, 0.02), (650.0, 0.04), (975.0, 0.04)]
+)
+def test_no_links_word_wraps(nominal_v, step_v):
+    """A 690 V drive's link is 975 V: at 0.02 V per count of a signed word it read -336 V."""
+    power_stage = replace(Plant().power_stage, link_v=nominal_v)
+    firmware = drive(Plant(power_stage=power_stage))
+    firmware.x[at.X_LINK] = 1.1 * nominal_v
+    words = firmware.registers.read(MAP.window_address, MAP.window_header_words)
+    counts = int(np.array(words[-2], np.uint16).view(np.int16))
+    assert get(firmware, "dc_link_scale_v") == pytest.approx(step_v)
+    assert counts * step_v == pytest.approx(1.1 * nominal_v, abs=step_v)

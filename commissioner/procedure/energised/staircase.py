@@ -197,7 +197,7 @@ class _Stair(DirectCurrent):
         carries = FIRST_CARRIES if self._is_first else CARRIES
         seen = self.findings.first_current
         voltage_v, wanted_a = max(steady[-1], seen.voltage_v[1] if seen else 0.0), share * self._top_a
-        step_s = STEER_S
+        step_s, seen_a = STEER_S, reached[-1]
         while reached[-1] < wanted_a and voltage_v < job.test_voltage_v:
             rate = slow if seen or reached[-1] > carries * self._top_a else max(slow, job.test_voltage_v / IDLE_S)
             voltage_v = min(voltage_v + rate * self.climbing_s(step_s), job.test_voltage_v)
@@ -208,9 +208,9 @@ class _Stair(DirectCurrent):
             rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
             held_v = voltage_v - self._plan.largest_inductance_h * rise
             steady.append(max(steady[-1], held_v, self._holds_at_least(voltage_v, seen_a)))
-        if reached[-1] < 0.3 * wanted_a:
+        if seen_a < 0.3 * wanted_a:
             raise Aborted(
-                "no current flows", step=self._where, value=f"{reached[-1]:.3g} A",
+                "no current flows", step=self._where, value=f"{seen_a:.3g} A",
                 limit=f"{wanted_a:.3g} A within {job.test_voltage_v:.3g} V",
                 remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
             )  # fmt: skip

@@ -15,12 +15,11 @@ from collections.abc import Callable
 from commissioner.encoding import JsonObject
 from commissioner.errors import Aborted
 from commissioner.run.archive.documents import read_document
-from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import SERVICE, OperatorStop
 
 BEAT_S, SILENCE_S = 0.5, 2.0
 """Between two beats; no beat for SILENCE_S ends the run."""
 TICK_S = 0.1
-SERVICE = "service"
 
 
 class DeadMan:

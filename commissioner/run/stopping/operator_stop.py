@@ -13,6 +13,9 @@ from typing import Any
 
 STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name))
 
+SERVICE = "service"
+"""Who asks where no person did: the service lost its operator's page, is shut down, or is gone."""
+
 
 @dataclass(frozen=True)
 class StopAsked:
@@ -20,6 +23,16 @@ class StopAsked:
 
     person: str
     reason: str
+
+    @property
+    def what(self) -> str:
+        """How the run ended by it."""
+        return "stopped by the service" if self.person == SERVICE else "stopped by the operator"
+
+    @property
+    def remedy(self) -> str:
+        first = "see that the service runs and the operator's page stays open, then " if self.person == SERVICE else ""
+        return f"{first}start again when ready"
 
     def __str__(self) -> str:
         return f"{self.reason} ({self.person})" if self.person else self.reason

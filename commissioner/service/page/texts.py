@@ -16,7 +16,7 @@ from starlette.requests import HTTPConnection
 from commissioner.motor.circuit import QUANTILE
 from commissioner.motor.quantities import places
 from commissioner.report.sheet.words import NBSP
-from commissioner.run.stopping.dead_man import SERVICE
+from commissioner.run.stopping.operator_stop import SERVICE
 from commissioner.service.access.visitors import LOCAL
 from commissioner.service.problems import Refusal
 

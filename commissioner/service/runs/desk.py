@@ -12,7 +12,7 @@ from pathlib import Path
 
 from commissioner.run.archive.documents import origin_of
 from commissioner.run.holding.drive_lock import runs_holding
-from commissioner.run.stopping.dead_man import SERVICE
+from commissioner.run.stopping.operator_stop import SERVICE
 from commissioner.run.stopping.stop_file import ask_to_stop
 from commissioner.service.audit import Audit
 from commissioner.service.configuration import Settings

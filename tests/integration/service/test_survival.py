@@ -134,12 +134,12 @@ def test_a_killed_service_leaves_zero_volts_and_its_successor_explains_what_was(
     assert dead_after_s(bench, began) <= ZERO_VOLTS_S
     with serve(folder, bench) as successor:
         result = successor.wait_over(run)
-        assert (result["outcome"], result["error"]["what"]) == ("aborted", "stopped by the operator")
+        assert (result["outcome"], result["error"]["what"]) == ("aborted", "stopped by the service")
         assert "the service that started this run is gone" in result["error"]["value"]
         assert successor.client.get("/api/health").json()["runs_live"] == []
         assert state_of(successor)["is_energised"] is False
         page = successor.page(f"/runs/{run}")
-        assert "Stopped by the operator" in page and "the service that started this run is gone" in page
+        assert "Stopped by the service" in page and "the service that started this run is gone" in page
         assert successor.client.get("/api/audit").json()["chain"]["is_intact"]
         again = successor.start_run(drive="bench")
         successor.wait_energised(again)

@@ -239,3 +239,35 @@ def test_the_staircase_of_a_slow_machine_is_not_waited_out():
     assert fitted[0].energised_s < 6.0
     assert fitted[0].stator_resistance_ohm == pytest.approx(machine.r_s, rel=0.1)
     assert drive.peak_flux_wb <= 1.02 * job.flux_limit_wb(machine.r_s)
+
+
+class Sagging(ScriptedDrive):
+    """Does not correct its voltage for its link, which falls to 486 of 540 V as it is energised for the third time: after first current
+    and staircase."""
+
+    link = 1.0
+
+    def _start(self):
+        super()._start()
+        self.link = 0.9 if self._session >= 3 else 1.0
+
+    def _step(self, load):
+        self._bd = self.link * self.machine.matrices()[1]
+        return super()._step(load)
+
+    def _fetch(self):
+        block = super()._fetch()
+        return None if block is None else replace(block, dc_link_v=540.0 * self.link)
+
+
+def test_a_link_that_fell_before_the_tests_is_said_and_nothing_is_written():
+    """All four values come out as 1/0.9 of the true ones, and alike on every axis: the link alone tells."""
+    drive, findings = Sagging(), Findings()
+    ended = drive.run(course(_job((0.0, 60.0)), findings))
+    found, true = findings.identification.parameters, drive.machine
+    assert found.stator_resistance_ohm == pytest.approx(true.r_s / 0.9, rel=0.02)
+    assert found.leakage_inductance_h == pytest.approx(true.l_sigma / 0.9, rel=0.02)
+    assert ended.outcome == "rejected"
+    assert ended.reason == "the DC link moved between the tests"
+    assert not any(isinstance(c, ask.WriteParameters) for c in drive.sent)
+    assert any("486 and 540 V" in remark for remark in findings.identification.remarks)

@@ -1,12 +1,14 @@
 """The verdict on hand-made evidence: axes are compared where the iron was equally deep."""
 
 import csv
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from commissioner.identify.excite.duration import LongerTest
+from commissioner.identify.intake.dc_link import LinkCourse
 from commissioner.motor.circuit import PARAMETERS, SYMBOLS, InverseGamma, Quantity
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.verdict import Decision, Evidence, decide
@@ -117,3 +119,43 @@ def test_a_shaft_that_turned_is_the_reason_where_it_makes_values_too_uncertain()
     assert "2 rad/s" in str(verdict.objections[0].value)
     still = replace(evidence, turned=((0.0, 0.4, 0.004),))
     assert decide(still, PLATE, ACCEPTANCE, write_back=True).decision is Decision.WRITE_BACK
+
+
+def scaled(factor):
+    return {name: Quantity(factor * value.value, value.std) for name, value in VALUES.items()}
+
+
+def objections(link, *tests, **more):
+    axes = tuple((60.0 * number, values) for number, values in enumerate(tests))
+    evidence = replace(Evidence(VALUES, axes, link=link), **more)
+    return [o.what for o in decide(evidence, PLATE, ACCEPTANCE, write_back=True).objections]
+
+
+def test_a_link_that_moved_before_the_tests_makes_every_value_doubtful():
+    """486 V where 540 V were: an uncorrected drive applies 0.9 of what it is commanded, and all four values come out as 1/0.9."""
+    moved = LinkCourse(486.0, 540.0, (486.0, 486.0))
+    assert objections(moved, VALUES, VALUES) == ["the DC link moved between the tests"]
+    assert moved.doubt == pytest.approx(0.05, abs=0.003)
+
+
+def test_values_that_follow_the_link_are_those_of_a_drive_that_does_not_correct_for_it():
+    between = LinkCourse(520.0, 545.0, (520.0, 545.0))
+    assert objections(between, scaled(545.0 / 520.0), VALUES) == ["the DC link moved between the tests"]
+
+
+def test_a_drive_that_corrects_for_its_link_is_not_objected_to():
+    between = LinkCourse(486.0, 540.0, (486.0, 540.0))
+    assert objections(between, VALUES, VALUES) == []
+
+
+def test_a_test_in_which_the_link_moved_says_nothing_of_whether_the_drive_corrects():
+    """Its look saw 540 V, its test 486 V, as the tests after it did: their values agree, and are all wrong."""
+    within = LinkCourse(486.0, 540.0, (math.nan, 486.0))
+    assert objections(within, VALUES, VALUES) == ["the DC link moved between the tests"]
+
+
+@pytest.mark.parametrize("lowest_v", [531.0, 540.0])
+def test_a_link_that_stood_still_or_was_not_seen_is_no_objection(lowest_v):
+    """By less than R_s may be uncertain: half of 9 V in 535 V is 0.8 %."""
+    assert objections(LinkCourse(lowest_v, 540.0, (540.0, lowest_v)), VALUES, VALUES) == []
+    assert objections(None, VALUES, VALUES) == []

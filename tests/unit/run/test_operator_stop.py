@@ -8,7 +8,7 @@ import pytest
 
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.runner import Runner
-from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop
+from commissioner.run.stopping.operator_stop import SERVICE, Abandoned, OperatorStop
 from commissioner.safety import commands as ask
 from tests.unit.run.test_full_disk import Drive
 
@@ -97,3 +97,15 @@ def test_a_second_wish_interrupts_nothing(folder):
             compute(1.0)
         signal.raise_signal(signal.SIGINT)
     assert stop.asked == "first"
+
+
+@pytest.mark.parametrize(
+    ("person", "what"),
+    [("anna", "stopped by the operator"), ("", "stopped by the operator"), (SERVICE, "stopped by the service")],
+)
+def test_a_run_says_whether_a_person_or_the_service_stopped_it(folder, person, what):
+    stop = OperatorStop()
+    stop.ask(person, "enough")
+    ended = perform(folder, course_that_computes(), stop)
+    assert (ended.outcome, ended.reason) == ("aborted", what)
+    assert ended.error["remedy"].endswith("start again when ready")

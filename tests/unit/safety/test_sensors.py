@@ -344,3 +344,81 @@ def test_the_drives_word_may_be_a_neighbours_by_five_standard_deviations_of_nois
     said_a = over * (0.004 * LIMIT_A + 5.0 * noise_a) / 0.9
     watch.claim(replace(STATUS, is_energised=True, current_magnitude_a=said_a, samples_produced=104))
     assert (watch.judge(a_block(peak_a=0.0)) is None) is passes
+
+
+def single_phase(phase, axis_deg):
+    """Currents of a motor whose `phase` is open: the others carry one current, there and back, as their voltages drive it."""
+
+    def damage(seen, start):
+        forth, back = (other for other in range(3) if other != phase)
+        through = (seen[forth] - seen[back]) / 2.0
+        out = np.zeros_like(seen) + NOISE[:, start : start + seen.shape[1]]
+        out[forth], out[back] = out[forth] + through, out[back] - through
+        return out
+
+    return verdict(axis_deg=axis_deg, damage=damage, offset=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("phase", "axis_deg"), [(1, 0.0), (2, 0.0), (0, 60.0), (1, 60.0), (0, 120.0), (2, 120.0), (1, 90.0)]
+)
+def test_an_open_phase_is_named_as_one_and_is_no_sensors_fault(phase, axis_deg):
+    reason = single_phase(phase, axis_deg)
+    assert reason is not None
+    assert reason.what.startswith(f"phase {'uvw'[phase]} carries no current")
+    assert not reason.is_fault
+    assert reason.value < 0.01
+
+
+@pytest.mark.parametrize("phase", [0, 1, 2])
+def test_a_silent_sensor_is_no_open_phase(phase):
+    """Its phase carries a current, which the other two sensors do not add up to zero without."""
+    reason = verdict(axis_deg=15.0, damage=of_phase(phase, lambda i: NOISE[0, : i.size]))
+    assert reason is not None
+    assert "sensor" in reason.what
+    assert reason.is_fault
+
+
+def stopping(after, voltage_v, current_a, seconds=1.0):
+    """A window watch over a current that is there until `after` (s), and the time of what it says."""
+    watch, noise = SensorWatch(LIMIT_A), np.random.default_rng(5)
+    cosines = np.array(phase_cosines(0.0))[:, None]
+    for number in range(round(seconds / (ROWS * PERIOD_S))):
+        time_s = (number * ROWS + np.arange(ROWS)) * PERIOD_S
+        on = time_s >= ZERO_S
+        volts = np.where(on, voltage_v(time_s), 0.0)
+        axis = np.where(on & (time_s < after), current_a(time_s), 0.0)
+        u, v, w = cosines * axis + noise.normal(0.0, 0.003, (3, ROWS))
+        block = SampleBlock(
+            session=1, first_index=number * ROWS, sample_period_s=PERIOD_S, axis_deg=0.0, voltage_axis_v=volts, current_u_a=u,
+            current_v_a=v, current_w_a=w, dc_link_v=540.0, lost_before=0, clipped=False,
+        )  # fmt: skip
+        if (reason := watch.judge(block)) is not None:
+            return reason, float(time_s[-1])
+    return None, seconds
+
+
+@pytest.mark.parametrize("hertz", [0.0, 2.0, 50.0])
+def test_a_contactor_that_opens_in_a_test_is_seen_in_a_fifth_of_a_second(hertz):
+    reason, seen_s = stopping(
+        0.6, lambda t: 2.0 + 20.0 * np.cos(2 * np.pi * hertz * t), lambda t: 4.0 * np.cos(2 * np.pi * hertz * t)
+    )
+    assert reason is not None
+    assert reason.what.startswith("no current flows any more")
+    assert not reason.is_fault
+    assert 0.6 < seen_s <= 0.6 + (0.2 if hertz == 0.0 else 0.4)
+
+
+@pytest.mark.parametrize("hertz", [0.7, 2.0, 20.0])
+def test_a_current_that_only_passes_through_zero_has_not_stopped(hertz):
+    """A quarter of a period behind its voltage, which is at its peak then."""
+    reason, _ = stopping(
+        9.0, lambda t: 20.0 * np.cos(2 * np.pi * hertz * t), lambda t: 0.6 * np.sin(2 * np.pi * hertz * t), 3.0
+    )
+    assert reason is None
+
+
+def test_voltage_that_drove_no_current_yet_is_no_current_that_stopped():
+    """A climb through an inverter's dead band, and the end of a test: its voltage is small before its current is."""
+    reason, _ = stopping(9.0, lambda t: 10.0 * t, lambda t: np.maximum(t - 0.8, 0.0), 2.0)
+    assert reason is None
