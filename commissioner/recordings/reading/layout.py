@@ -32,6 +32,9 @@ UNITS = frozenset({"verticalunits", "verticalunit", "vunit", "vunits", "yunit", 
 _COUNT = re.compile(r"^[\d.,]+\s*(?=\D)")
 """Of a unit that is so many others (`100 ns`, `0.1 ms`)."""
 
+_MARKED = re.compile(r"^(?:[# ]+|%[% ]*(?=[^\W\d_\[(]))+")
+"""What marks a line above the numbers as no row of them: `# t ia`, `% t[s] ia[A]`."""
+
 Row = list[str]
 
 
@@ -89,7 +92,7 @@ def split(line: str, separator: str) -> Row:
 
 def _said(line: str, separator: str) -> Row:
     """The cells of a line above the numbers; a number behind its key whole that its comma would cut (`# rated_current_a: 4,86`)."""
-    cells = split(line.lstrip("# "), separator)
+    cells = split(_MARKED.sub("", line), separator)
     if separator != ",":
         return cells
     out = cells[:1]
