@@ -8,10 +8,11 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.reading.cells import NUMBER, is_number, is_numeric
-from commissioner.recordings.reading.layout import HEAD_ROWS, LONGEST_LINE, head_lines, split
+from commissioner.recordings.reading.layout import HEAD_ROWS, LONGEST_LINE, head_lines, known, split
 from commissioner.recordings.units import Unit, is_unit, read_unit, unit_in
 
 MARKS = (";", "\t", ",")
@@ -52,8 +53,8 @@ def united(text: str, source: str) -> str:
     for k, line in enumerate(lines):
         for mark in MARKS if not line.text.startswith("#") else ():
             rows = [split(one.text, mark) for one in lines[k : k + HEAD_ROWS]]
-            if _are_united(rows):
-                above = split(lines[k - 1].text.lstrip("#"), mark) if k else []
+            above = split(lines[k - 1].text.lstrip("# "), mark) if k else []
+            if _are_united(rows, above):
                 columns = [_column(cells, above) for cells in enumerate(zip(*rows, strict=True))]
                 return _head(text[: line.start], above, columns, mark) + _bare(
                     text[line.start :], columns, mark, source
@@ -61,13 +62,19 @@ def united(text: str, source: str) -> str:
     return text
 
 
-def _are_united(rows: Sequence[Sequence[str]]) -> bool:
-    """Rows of one width whose cells are numbers, or one unit's at the same places in all."""
+def _are_united(rows: Sequence[Sequence[str]], above: Sequence[str]) -> bool:
+    """Rows of one width whose columns are numbers, or one unit's; below names that are known, texts among them (a test's name)."""
     if len(rows) < HEAD_ROWS or len({len(row) for row in rows}) != 1:
         return False
-    measured = [{found[2].measures for cell in cells if (found := parts(cell))} for cells in zip(*rows, strict=True)]
-    are_numbers = all(is_numeric(cell) or parts(cell) for row in rows for cell in row)
-    return are_numbers and sum(map(bool, measured)) >= LEAST_UNITED and all(len(one) <= 1 for one in measured)
+    columns = list(zip(*rows, strict=True))
+    measured = [{found[2].measures for cell in cells if (found := parts(cell))} for cells in columns]
+    others = [cells for cells in columns if not all(is_numeric(cell) or parts(cell) for cell in cells)]
+    are_texts = known(above) > 1 and not any(map(is_quantity, chain(*others)))
+    return (
+        (not others or are_texts)
+        and sum(map(bool, measured)) >= LEAST_UNITED
+        and all(len(one) <= 1 for one in measured)
+    )
 
 
 def _column(placed: tuple[int, Sequence[str]], above: Sequence[str]) -> _Column:

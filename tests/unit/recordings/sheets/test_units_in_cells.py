@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.recordings.importers import read_running
+from commissioner.recordings.importers import contract_table, read_running
 from commissioner.recordings.names import meaning_of, meanings_of, unit_of
+from commissioner.recordings.sheets.united import united
 
 N, RATE_HZ = 400, 2000.0
 T = np.arange(N) / RATE_HZ
@@ -75,6 +76,22 @@ def test_a_row_of_units_above_such_cells_is_not_applied_twice(tmp_path):
     columns = [cells(T, " ms", 1e3), *(cells(x, " mA", 1e3) for x in AMPS), *(cells(x, " V") for x in VOLTS)]
     text = table(NAMES, columns).replace("\n", "\nms;mA;mA;mA;V;V;V\n", 1)
     require_right(read(tmp_path, text))
+
+
+def test_a_table_of_tests_may_have_units_in_its_cells(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(
+        "Test,f,U,I,P\nDC,0 Hz,24 V,8 A,192 W\nNo load,50 Hz,400 V,3400 mA,0.22 kW\nLocked rotor,50 Hz,88 V,8.5 A,560 W\n"
+    )
+    seen = contract_table(path).columns
+    np.testing.assert_allclose(seen["current_line_a"], [8.0, 3.4, 8.5])
+    np.testing.assert_allclose(seen["power_w"], [192.0, 220.0, 560.0])
+    np.testing.assert_allclose(seen["voltage_line_v"], [24.0, 400.0, 88.0])
+
+
+def test_quantities_down_the_rows_are_not_taken_for_columns(tmp_path):
+    text = "quantity;no load;locked\nU12;400 V;88 V\nU23;401 V;88 V\nU31;399 V;88 V\nI;3.4 A;8.5 A\n"
+    assert united(text, "x") == text
 
 
 def test_a_cell_that_measures_something_else_is_refused(tmp_path):
