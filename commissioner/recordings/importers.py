@@ -9,6 +9,7 @@ What was changed or left unused stands in the table's notes.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from commissioner.paths import no_file
 from commissioner.recordings.catalogue.plate_said import plate_said
 from commissioner.recordings.formats import comtrade, mdf4, structures, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
-from commissioner.recordings.formats.kinds import require_kind
+from commissioner.recordings.formats.kinds import is_text, require_kind
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
@@ -72,6 +73,7 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
 PLATE_KEYS = frozenset((*(one.name for one in fields(Nameplate)), "sample_period_s", "switching_frequency_hz"))
 """Numbers of a recording that stand beside its columns."""
 HEAD_BYTES = 65536
+_WORD = re.compile(rb'(?:\xef\xbb\xbf)?[#%"\s]*[A-Za-z\x80-\xff]')
 VECTOR = "three phase voltages or two line-to-line voltages"
 
 
@@ -140,7 +142,7 @@ def _read(path: Path, mapping: ChannelMap) -> Table:
     require_kind(path, workbook.ENDINGS)
     if suffix in workbook.ENDINGS:
         return _of_text(path, mapping)
-    if suffix in _BINARY:
+    if suffix in _BINARY and not _is_named_text(path):
         return _of_binary(path, mapping)
     if suffix == ".parquet":
         return _of_table(read_table(path), mapping)
@@ -206,6 +208,11 @@ def _is_plain(path: Path) -> bool:
         return False
     plain = not is_long(names) and all(name in CONTRACT_COLUMNS or not unit_in(name) for name in names)
     return plain and all(is_number(cell) or not cell for cell in cells)
+
+
+def _is_named_text(path: Path) -> bool:
+    """A `.dat` that a program wrote as text, its names above the numbers: those of COMTRADE begin with a number."""
+    return path.suffix.lower() == ".dat" and is_text(path) and _WORD.match(_head(path)) is not None
 
 
 def _of_binary(path: Path, mapping: ChannelMap) -> Table:

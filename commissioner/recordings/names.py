@@ -6,7 +6,15 @@ import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
-from commissioner.recordings.units import IN_NAME, is_temperature, read_unit, unbracketed, unit_in, without_brackets
+from commissioner.recordings.units import (
+    IN_NAME,
+    is_temperature,
+    measured_by,
+    read_unit,
+    unbracketed,
+    unit_in,
+    without_brackets,
+)
 from commissioner.recordings.words import MOST_KEPT, folded, translated
 
 PHASES = {
@@ -49,6 +57,7 @@ FILLING = frozenset(
         "last",
         "ave",
         "instantaneous",
+        "inst",
         "abc",
         "uvw",
         "rst",
@@ -64,7 +73,6 @@ REMARKS = FILLING | {
     "eff",
     "total",
     "in",
-    "inst",
     "probe",
     "sensor",
     "utc",
@@ -93,6 +101,8 @@ TIME = frozenset(
         "zeitstempel",
         "uhrzeit",
         "datetime",
+        "messzeit",
+        "zeitpunkt",
         "dateandtime",
         "datumuhrzeit",
         "datumzeit",
@@ -166,6 +176,19 @@ _OTHERS = re.compile(rf"(?<![a-z]){_KIND}?[acst](?![a-z])", re.IGNORECASE)
 _OF_A_PHASE = re.compile(rf"(?<![a-z]){_KIND}(?=[ryb]{{0,2}}n?(?![a-z]))", re.IGNORECASE)
 _COMPONENT = re.compile(rf"({CURRENT}|{VOLTAGE})s?(alpha|beta)(?:ref|soll|set|cmd|command|act|ist|mess|meas)?")
 """Of a vector: `i_alpha`, `uβ`, `us_alpha_ref`."""
+_OF_CHANNEL = re.compile(r"^(?:ch|chan|channel|kanal)[ ._]?\d+(?:[-_.]\d+)?[ .:_-]+(?=[^\W\d])", re.IGNORECASE)
+"""An instrument's own name of a channel, before that which somebody gave it: `CH1 Ia`."""
+_LOOSE = re.compile(
+    r"[\[(](?P<before>[^\])]+)[\])]\s*(?P<after>\S.*)|(?P<name>.*[^\s.-])(?:\s+-\s*|\.|\s+)(?P<unit>[^\s.]{1,6})"
+)
+"""A unit before its name, or behind a dash, a point or a space."""
+_TIME_OF = re.compile(r"(?:t|time|zeit|temps|tempo|tiempo)[ _.](?!.*/)(.+)", re.IGNORECASE)
+"""A time that one channel has to itself: `t Ia`, `Time_CH1`."""
+_KIND_DOT = re.compile(rf"(?<![^\W_])({_KIND})\.(?=l?[abcuvwrst123]{{1,2}}(?![^\W_]))", re.IGNORECASE)
+"""`i.u`, `Motor.U.uv`: the point stands between a quantity and its phase."""
+_CYRILLIC = re.compile(r"(?<![а-яё])[авс]{1,2}(?![а-яё])", re.IGNORECASE)
+_AS_LATIN = str.maketrans("авсАВС", "abcABC")
+"""Phases in letters that look alike."""
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
@@ -174,14 +197,35 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
     """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
     if CONTRACT.fullmatch(name):
         return name
-    last = _PARAMETER.sub("", _without_path(name))
+    raw, last = name, _PARAMETER.sub("", _without_path(name))
     name = translated(name if last.isdigit() else last)
     if _NEUTRAL.fullmatch(key_of(IN_NAME.sub("", name))):
         return None
     if not IN_NAME.sub("", name).strip() and (unit := read_unit(unit_in(name))) and unit.measures == "time":
         return "time_s"
     found = _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
+    found = found or _meaning_of_loose(raw, with_s)
     return None if found == "time_s" and is_temperature(unit_in(name)) else found
+
+
+def _meaning_of_loose(name: str, with_s: bool) -> str | None:
+    """The column of a name with its channel before it, its unit elsewhere than at its end in brackets, or a time of one channel."""
+    if (own := _OF_CHANNEL.sub("", name)) != name:
+        return meaning_of(own, with_s)
+    if (of := _TIME_OF.fullmatch(name)) and (meaning_of(of[1], with_s) or "").startswith(("current_", "voltage_")):
+        return "time_s"
+    loose = _loose_unit(name)
+    return meaning_of(loose[0], with_s) if loose else None
+
+
+def _loose_unit(name: str) -> tuple[str, str] | None:
+    """(name, unit) of a name whose unit stands before it, or behind a dash, a point or a space, and measures what the name means."""
+    found = _LOOSE.fullmatch(name.strip())
+    if not found:
+        return None
+    bare, text = found["after"] or found["name"], found["before"] or found["unit"]
+    unit, meaning = read_unit(text), meaning_of(bare)
+    return (bare, text) if unit and meaning and measured_by(meaning) == unit.measures else None
 
 
 def unit_of(name: str, with_s: bool = False) -> str:
@@ -189,6 +233,9 @@ def unit_of(name: str, with_s: bool = False) -> str:
     or describes the channel (`Ia (phase A)`)."""
     text, bare = unit_in(name), IN_NAME.sub("", name).strip()
     known = read_unit(text)
+    if not text:
+        loose = None if _meaning(translated(_without_path(name)), with_s) else _loose_unit(name)
+        return loose[1] if loose else ""
     is_part = bare and meaning_of(bare, with_s) is None and meaning_of(name, with_s) is not None
     return "" if is_remark(text) or (is_part and (known is None or known.scale == 1.0)) else text
 
@@ -296,7 +343,7 @@ def key_of(name: str) -> str:
 
 def _without_path(name: str) -> str:
     """A name without the structures before it; points of its unit (`Ia [p.u.]`) and of a short word (`Segment No.`) are its own."""
-    return _PATH.sub("", name)
+    return _PATH.sub("", _KIND_DOT.sub(r"\1_", name))
 
 
 def meanings_of(names: Sequence[str]) -> dict[str, str]:
@@ -314,6 +361,7 @@ def is_per_minute(name: str) -> bool:
 
 def _meaning(bare: str, with_s: bool) -> str | None:
     bare = re.sub("[αΑ]", "alpha", re.sub("[βΒ]", "beta", folded(bare)))
+    bare = _CYRILLIC.sub(lambda found: found[0].translate(_AS_LATIN), bare)
     words = [word.lower() for word in _WORD.findall(bare)]
     key = re.sub(r"[^a-z0-9]", "", bare.lower())
     if key in TIME or _TIME_OF_RATE.fullmatch(key):

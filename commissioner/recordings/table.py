@@ -48,6 +48,8 @@ MAX_METADATA_LINES = 1000
 MOST_AVERAGED = 1000
 KEY_AND_VALUE = re.compile(r"([^:=]+)[:=](.*)")
 """Of a comment; `=` is not what we write, yet a value written so must not be lost without a word."""
+COARSE_STEP = 1e-8
+"""Of a median step, by which the mean differs where stamps are rounded; sums of doubles differ by 1e-12."""
 STEP_TOLERANCE, MOST_ROUNDED, COARSEST_S = 0.02, 0.1, 1e-3
 """Of a period, by which time steps may differ; by how much more at most where the time stamps are rounded, and to what at the coarsest."""
 
@@ -300,7 +302,7 @@ def to_running(table: Table) -> RunningRecording:
     columns = table.columns
     empty = np.full(columns["time_s"].size, np.nan)
     time = columns["time_s"]
-    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    period = float(table.metadata.get("sample_period_s", 0.0) or _usual_step(time))
     i = [columns.get(name, empty) for name in CURRENTS]
     v = [columns.get(name, empty) for name in voltages]
     return RunningRecording(
@@ -323,7 +325,7 @@ def to_currents(table: Table) -> RunningRecording:
     time = table.columns["time_s"]
     empty = np.full(time.size, np.nan)
     u, v, w = (table.columns.get(name, empty) for name in CURRENTS)
-    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    period = float(table.metadata.get("sample_period_s", 0.0) or _usual_step(time))
     return RunningRecording(
         time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,
         table.source, table.notes,
@@ -366,6 +368,14 @@ def sample_period(table: Table, segment: Signal) -> float:
             "record at a fixed rate, or resample with known time stamps",
         )
     return period
+
+
+def _usual_step(time: Signal) -> float:
+    """The median step, or the mean where stamps are so coarse that it lies apart (seconds since 1970 have steps of 0.24 us)."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    mean = _mean_step(steps) if usual > 0.0 else usual
+    return mean if abs(mean - usual) > COARSE_STEP * usual else usual
 
 
 def _mean_step(steps: Signal) -> float:

@@ -71,7 +71,7 @@ FOREIGN = frozenset({"%", "pu", "p.u.", "counts", "count", "lsb", "digits", "raw
 """Units that stand for something only with a factor which the file does not give."""
 IN_NAME = re.compile(
     r"[\[(（【{<]\s*([^\])）】}>]*)\s*[\])）】}>]\s*$|(?:^|\s+)(?:in|en)\s+(\S{1,8})\s*$|\s*/\s*(\S{1,6})\s*$"
-    r"|(?:(?<!_per)_|[,:]\s+)(ms|us|µs|ns|s|ma|mA|A|mv|mV|V|kv|kV|rpm|rad)$"
+    r"|(?:(?<!_per)_|[,:]\s+)(ms|us|µs|ns|s|ma|mA|A|mv|mV|V|kv|kV|rpm|rad|с|мс|мкс|А|мА|В|кВ)$"
 )
 """A unit at the end of a name: in brackets, after `in`, after a slash, an underscore, a comma or a colon."""
 

@@ -44,7 +44,7 @@ TRANSLATED = {
     "enroulements": "winding", "devanados": "winding", "bobinados": "winding", "avvolgimenti": "winding", "enrolamento": "winding",
     "enrolamentos": "winding", "do enrolamento": "winding", "dos enrolamentos": "winding", "do estator": "stator", "par enroulement": "per winding", "terminais": "terminals",
     "tra le fasi": "between phase", "fra le fasi": "between phase", "fra i": "between", "fra le": "between",
-    "lignes": "line", "líneas": "line", "linhas": "line", "linee": "line",
+    "lignes": "line", "líneas": "line", "linhas": "line", "linha": "line", "linee": "line",
     "bornes": "terminals", "bornas": "terminals", "terminales": "terminals", "terminali": "terminals", "morsetti": "terminals",
     "entre": "between", "tra": "between", "fra": "between", "por": "per", "línea": "line", "linea": "line", "ligne": "line",
     "fase": "phase", "fases": "phase", "fasi": "phase", "simple": "phase", "semplice": "phase", "stellata": "star", "sternspannung": "star spannung",
@@ -90,7 +90,14 @@ TRANSLATED = {
     "średnia": "mean", "średni": "mean", "ortalama": "mean", "rozruchowy": "starting", "partida": "starting", "kalkış": "starting",
     "conjugado": "torque", "liczba biegunów": "number of poles", "kutup sayısı": "number of poles", "połączenie": "connection",
     "bağlantı": "connection", "ligação": "connection", "süre": "time", "instante": "time", "akımı": "current", "gerilimi": "voltage",
-    "příkon": "input power", "phasenstrom": "phase strom",
+    "příkon": "input power", "phasenstrom": "phase strom", "da": " ", "das": " ", "dos": " ",
+    "時刻": "time", "경과": " ", "시간": "time", "시각": "time", "전류": "current", "전압": "voltage", "선간": " ", "상": " ",
+    "lijnspanning": "voltage", "netspanning": "voltage", "motorspanning": "voltage", "lijnstroom": "current", "motorstroom": "current",
+    "fasestroom": "phase current", "струм": "current", "напруга": "voltage", "час": "time", "фазы": "phase", "фази": "phase", "фаза": "phase",
+    "линейное": " ", "фазный": "phase", "напрежение": "voltage", "време": "time", "χρόνος": "time", "ρεύμα": "current", "τάση": "voltage",
+    "φάση": "phase", "idő": "time", "áram": "current", "feszültség": "voltage", "fázis": "phase", "timp": "time", "curent": "current",
+    "curentul": "current", "tensiune": "voltage", "tensiunea": "voltage", "vrijeme": "time", "vreme": "time",
+    "struja": "current", "napon": "voltage", "napetost": "voltage", "tok": "current", "napätie": "voltage", "prúd": "current",
 }  # fmt: skip
 """What only joins names is a space. With their accents, which name the code page of a text; looked for with or without them."""
 

@@ -36,6 +36,8 @@ from commissioner.recordings.reading.said_tests import codes, in_runs, is_title,
 from commissioner.recordings.sheet_names import is_sheet
 from commissioner.recordings.sheets.barred import unbarred
 from commissioner.recordings.sheets.indexed import in_rows
+from commissioner.recordings.sheets.joined import joined
+from commissioner.recordings.sheets.united import united
 from commissioner.recordings.sheets.upright import upright
 from commissioner.recordings.sheets.widened import widened
 from commissioner.records import ReadingNote, Signal
@@ -78,7 +80,9 @@ def read_text(path: Path) -> tuple[str, str]:
 
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
-    text = unbarred(text)
+    text = united(unbarred(text), source)
+    beside = joined(text)
+    text = beside or text
     turned = upright(text)
     wide = widened(text, source) if turned is None else None
     text = turned or wide or text
@@ -100,6 +104,12 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
     notes += factors_said(layout.preface)
     names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
+    if beside is not None:
+        notes.append(
+            ReadingNote(
+                "tables", "tables below each other hold other channels at the same times: they were read as one"
+            )
+        )
     if turned is not None:
         notes.append(
             ReadingNote(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import too_large, unpacked_limit
-from commissioner.recordings.reading.cells import is_number
+from commissioner.recordings.sheets.united import is_quantity
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
@@ -137,8 +137,8 @@ def _is_table(cells: Cells) -> bool:
 
 
 def _is_number(cell: object) -> bool:
-    """A number, or a text that is one."""
-    return is_number(cell) if isinstance(cell, str) else isinstance(cell, int | float) and not isinstance(cell, bool)
+    """A number, or a text that is one, with its unit or without."""
+    return is_quantity(cell) if isinstance(cell, str) else isinstance(cell, int | float) and not isinstance(cell, bool)
 
 
 def _shown(cell: object) -> str:

@@ -8,7 +8,7 @@ from commissioner.recordings.words import TRANSLATED
 
 SAMPLE = 1 << 16
 CODE_PAGES = {"cp1252": "Windows-1252", "gb18030": "GBK", "cp932": "Shift-JIS", "cp1251": "Windows-1251", "cp1250": "Windows-1250",
-              "cp1254": "Windows-1254"}  # fmt: skip
+              "cp1254": "Windows-1254", "big5": "Big5", "cp949": "Korean (cp949)", "cp1253": "Windows-1253"}  # fmt: skip
 """With what they are called. Of those that know as many letters the first: most of the West is the same in three of them."""
 WORDS = frozenset(word for word in (*TRANSLATED, *INTERVAL, *RATE, *WHOLE) if not word.isascii() and len(word) > 1)
 """Those that code pages write differently; a single letter is one of some word in each."""

@@ -32,6 +32,9 @@ UNITS = frozenset({"verticalunits", "verticalunit", "vunit", "vunits", "yunit", 
 _COUNT = re.compile(r"^[\d.,]+\s*(?=\D)")
 """Of a unit that is so many others (`100 ns`, `0.1 ms`)."""
 
+_MARKED = re.compile(r"^(?:[# ]+|%[% ]*(?=[^\W\d_\[(]))+")
+"""What marks a line above the numbers as no row of them: `# t ia`, `% t[s] ia[A]`."""
+
 Row = list[str]
 
 
@@ -89,7 +92,7 @@ def split(line: str, separator: str) -> Row:
 
 def _said(line: str, separator: str) -> Row:
     """The cells of a line above the numbers; a number behind its key whole that its comma would cut (`# rated_current_a: 4,86`)."""
-    cells = split(line.lstrip("# "), separator)
+    cells = split(_MARKED.sub("", line), separator)
     if separator != ",":
         return cells
     out = cells[:1]
@@ -131,7 +134,7 @@ def _without_rows(lines: Sequence[str], source: str) -> DataRefused:
     if not filled:
         return empty(source)
     rows = [_said(line, mark) for line in filled for mark in SEPARATORS if mark in line]
-    header = next((row for row in rows if len(row) > 1 and _known(row) > 1), None)
+    header = next((row for row in rows if len(row) > 1 and known(row) > 1), None)
     holds_numbers = any(sum(map(is_number, row)) > 1 for row in rows)
     what = (
         "the file holds a header and no row of numbers below it"
@@ -195,7 +198,7 @@ def _begun(lines: Sequence[_Line], first: int, separator: str, rows: Sequence[Ro
             break
         begins -= 1
     above = [split(line.text, separator) for line in lines[max(begins - 2, 0) : begins]]
-    return begins if any(_known(row) > 1 for row in above) else first
+    return begins if any(known(row) > 1 for row in above) else first
 
 
 def _require_one_table(above: Sequence[Row], source: str) -> None:
@@ -205,7 +208,7 @@ def _require_one_table(above: Sequence[Row], source: str) -> None:
         for k, row in enumerate(above)
         if row and is_number(row[0]) and sum(map(is_number, row)) > 1 and all(map(is_numeric, row))
     ]
-    named = next((k for k, row in enumerate(above[: numbers[-1]]) if _known(row) > 1), None) if numbers else None
+    named = next((k for k, row in enumerate(above[: numbers[-1]]) if known(row) > 1), None) if numbers else None
     lost = next((above[k] for k in numbers if named is not None and k > named), None)
     if lost is not None:
         raise DataRefused(
@@ -330,7 +333,7 @@ def _further_up(
     for count in range(used + 1, min(len(rows), used + MOST_BETWEEN) + 1) if used else ():
         row, below = rows[-count], rows[len(rows) - count + 1 :]
         for found in (_grouped(row, names), _padded(row, width)) if len(row) <= width else ():
-            if _known(found) > max(_known(best[0]), 1):
+            if known(found) > max(known(best[0]), 1):
                 of_row = next((r for r in below if _is_units(r)), [])
                 said = zip(_padded(of_row, width), map(unit_in, found), strict=True)
                 best = found, tuple(own or of_name for own, of_name in said), count
@@ -338,7 +341,7 @@ def _further_up(
     return *best, rest
 
 
-def _known(names: Sequence[str]) -> int:
+def known(names: Sequence[str]) -> int:
     """How many names mean a column of a recording or of a test sheet."""
     return len(meanings_of(names).keys() | sheet_columns(names).keys())
 
