@@ -88,6 +88,8 @@ class SampleBlock:
 
 UNUSED_VOLTAGE = "unused_voltage"
 """Code of the note that a column in volts could not be used, where no other was."""
+ONE_CURRENT = "one_current"
+"""Code of the note that one current was recorded and stands for the three."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from commissioner.monitor.signals.supply import (
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_current, stator_impedance
-from commissioner.records import UNUSED_VOLTAGE, RunningRecording
+from commissioner.records import ONE_CURRENT, UNUSED_VOLTAGE, RunningRecording
 
 SLIP_TRUST = 0.5
 """Relative standard deviation of the slip that a current alone suggests: at light load it is that of the magnetizing current."""
@@ -41,11 +41,13 @@ MOST_LINES = 6
 NEAR_SUPPLY_HZ = 0.6
 """A line of the mains' own within so much of a multiple of their frequency."""
 NO_VOLTAGE = "no voltages were recorded"
+NO_PHASES = "one current tells nothing of the other phases"
 NO_PLATE = "no nameplate is known (--motor, or the recording's metadata)"
 OF_POWER = ("voltage_rms_v", "voltage_unbalance", "power_w", "reactive_power_var", "power_factor")
 OF_SHAFT = ("mean_speed_rad_per_s", "slip", "rotor_side_bands")
+OF_PHASES = ("current_unbalance", "runs_backwards")
 OF_MODEL = ("parameters", "waveforms", "current_resimulation_error", "negative_sequence_excess_percent")
-"""What takes voltages, what takes the shaft's line, and what takes both and a plate."""
+"""What takes voltages, what takes the shaft's line, what takes more than one current, and what takes all and a plate."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +118,26 @@ def of_currents(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -
     else:
         withheld |= dict.fromkeys(OF_SHAFT, trouble.what if trouble else "no line of the shaft is seen")
     own = tuple(Line(f.frequency_hz, f.evidence) for f in (found.shaft, *found.loads) if f is not None)
-    hidden = {"third_voltage", "crossed_channels", "computed_voltage"}
+    hidden = {
+        "third_voltage",
+        "crossed_channels",
+        "computed_voltage",
+        *(("computed_current",) if _is_one(recording) else ()),
+    }
     notes = (*(f for f in audited.findings if f.code not in hidden), *bar_or_load(bands))
-    return Partial(speed, None, supply / (2 * np.pi), own, indicators, withheld, notes, by_slip, bands)
+    whole = Partial(speed, None, supply / (2 * np.pi), own, indicators, withheld, notes, by_slip, bands)
+    return _of_one(whole) if _is_one(recording) else whole
+
+
+def _is_one(recording: RunningRecording) -> bool:
+    """Whether one current stands for the three."""
+    return any(note.code == ONE_CURRENT for note in recording.notes)
+
+
+def _of_one(part: Partial) -> Partial:
+    """What one current tells: nothing that compares the phases."""
+    told = {name: value for name, value in part.indicators.items() if name not in OF_PHASES}
+    return replace(part, indicators=told, withheld={**part.withheld, **dict.fromkeys(OF_PHASES, NO_PHASES)})
 
 
 def _no_voltage(recording: RunningRecording) -> str:
@@ -155,7 +174,8 @@ def without_plate(recording: RunningRecording) -> Partial | Finding:
     withheld = dict.fromkeys(("mean_torque_nm", *OF_SHAFT, *OF_MODEL), NO_PLATE)
     if not has_volts:
         withheld |= dict.fromkeys(OF_POWER, _no_voltage(recording))
-    return Partial(None, None, f.frequency_hz, _lines(frame, f.frequency_hz), indicators, withheld)
+    whole = Partial(None, None, f.frequency_hz, _lines(frame, f.frequency_hz), indicators, withheld)
+    return _of_one(whole) if _is_one(recording) else whole
 
 
 def _with_made_voltages(recording: RunningRecording, plate: Nameplate) -> RunningRecording | None:

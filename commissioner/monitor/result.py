@@ -167,13 +167,15 @@ def partial_document(part: Partial, stretches: list[State], audited: Audited) ->
 
 
 def entry_of_part(part: Partial, source: str) -> Entry | None:
-    """What a baseline stores of currents alone: the operating point by the slip; None where the speed is not known."""
+    """What a baseline stores of currents alone: the operating point by the slip; None where the speed is not known,
+    or nothing is there to compare."""
     if part.speed_rad_per_s is None or part.by_slip_nm is None:
         return None
-    watched = {"current_unbalance": (part.indicators["current_unbalance"], UNBALANCE_NOISE)}
+    unbalance = part.indicators.get("current_unbalance")
+    watched = {} if unbalance is None else {"current_unbalance": (unbalance, UNBALANCE_NOISE)}
     if part.side_bands is not None:
         watched["rotor_side_band_db"] = (part.side_bands.level_db, SIDE_BAND_NOISE_DB)
-    return Entry(source, part.speed_rad_per_s.value, part.by_slip_nm, part.supply_hz, watched)
+    return Entry(source, part.speed_rad_per_s.value, part.by_slip_nm, part.supply_hz, watched) if watched else None
 
 
 def cannot_be_fixed(fitted: Fitted) -> OpenDirection:

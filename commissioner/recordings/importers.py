@@ -52,6 +52,7 @@ from commissioner.recordings.sheets.widened import is_long
 from commissioner.recordings.standstill.components import along_axis, with_phases
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
+    CURRENTS,
     HOW_TO_MAP,
     ColumnReading,
     Table,
@@ -96,8 +97,11 @@ def require_running(table: Table) -> None:
 
 
 def has_currents_only(table: Table) -> bool:
-    """Whether time and currents are there, and no voltage or too few for a vector."""
-    return "voltage_axis_v" not in table.columns and _missing(table.columns) == [VECTOR]
+    """Whether time and currents are there, or one of them, and no voltage or too few for a vector."""
+    there, missing = table.columns, _missing(table.columns)
+    return (
+        VECTOR in missing and "time_s" in there and "voltage_axis_v" not in there and any(n in there for n in CURRENTS)
+    )
 
 
 def with_few_voltages_said(table: Table) -> Table:

@@ -22,6 +22,7 @@ import pyarrow.parquet as pa_parquet
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused, UsageError
+from commissioner.monitor.intake.columns import from_one_current
 from commissioner.motor.computed import COMPUTED, printed_step, without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, too_large
@@ -319,17 +320,23 @@ def to_running(table: Table) -> RunningRecording:
 
 
 def to_currents(table: Table) -> RunningRecording:
-    """The table as a running recording without voltages (NaN throughout). DataRefused: fewer than two currents, or no time."""
-    _require(table, ("time_s", *_all_but_one(CURRENTS, table.columns)), "a recording of a motor's currents")
+    """The table as a running recording without voltages (NaN throughout). One current stands for three. DataRefused: no current, or no time."""
+    _require(
+        table,
+        ("time_s", *(tuple(n for n in CURRENTS if n in table.columns) or CURRENTS)),
+        "a recording of a motor's currents",
+    )
     table = _without_unmeasured(table, *on_one_clock(table.columns, CURRENTS, table.source))
     time = table.columns["time_s"]
     empty = np.full(time.size, np.nan)
     u, v, w = (table.columns.get(name, empty) for name in CURRENTS)
     period = float(table.metadata.get("sample_period_s", 0.0) or _usual_step(time))
     return RunningRecording(
+    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    return from_one_current(RunningRecording(
         time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,
         table.source, table.notes,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def _all_but_one(names: tuple[str, str, str], columns: Mapping[str, Signal]) -> tuple[str, ...]:

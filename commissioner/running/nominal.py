@@ -49,6 +49,8 @@ ASSUMED_RUN_UP_S = 0.3
 ASSUMED_SHARES = (1.0, 0.3, 0.1)
 """Of a motor whose start was not recorded: from a load as heavy as ten of its own rotors to the bare shaft. Between two of these the valley of
 inertia and load is straight enough: from four times the true inertia 50 steps did not reach it, and L_sigma stayed 4 % low."""
+TELLING_S = 3.0
+"""Of each window: what tells which of these is nearest. (Eleven steady seconds: 84 CPU-seconds, most of them to choose.)"""
 NEAR = 5.0
 """Change of chi-square a sample below which a fit that another follows has ended."""
 OPEN_INERTIA = 0.5
@@ -203,10 +205,10 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
                 )
                 machine = _settled(problem.cut(seconds), machine, own)
     law = RUN_UP_LOAD if smooth_load or record.has_start else ()
-    columns = columns_of((*numbers, *law, *LOAD_RIPPLE), record, machine, knots=not smooth_load)
+    free = (*numbers, *law, *LOAD_RIPPLE)
     if record.has_start or record.plate.inertia_kg_m2:
-        return refine(problem, machine, columns)
-    return _with_inertia(problem, machine, columns)
+        return refine(problem, machine, columns_of(free, record, machine, knots=not smooth_load))
+    return _with_inertia(problem, machine, free, knots=not smooth_load)
 
 
 def held_at_plate(problem: Problem, fit: Fit, names: Sequence[str]) -> Fit:
@@ -218,15 +220,18 @@ def held_at_plate(problem: Problem, fit: Fit, names: Sequence[str]) -> Fit:
     return refine(problem, machine, others, tolerance=NEAR)
 
 
-def _with_inertia(problem: Problem, machine: Machine, columns: tuple[Column, ...]) -> Fit:
+def _with_inertia(problem: Problem, machine: Machine, free: Sequence[str], *, knots: bool) -> Fit:
     """The fit with an inertia of its own where the recording tells it, from the best of several that are held.
 
     Held at an assumed one, ten times the true, a healthy motor's R_R was 12 % off (six standard errors) and a leakage that saturates was
     named. Where the recording tells nothing of it, it draws nothing aside either.
     """
-    assumed = machine.value("inertia")
-    held = [refine(problem, machine.with_values({"inertia": share * assumed}), columns) for share in ASSUMED_SHARES]
+    assumed, part = machine.value("inertia"), problem.cut(TELLING_S)
+    columns = columns_of(free, part.record, machine, knots=knots)
+    held = [refine(part, machine.with_values({"inertia": share * assumed}), columns) for share in ASSUMED_SHARES]
     fit = min(held, key=lambda f: f.chi2)
+    if part.until != problem.until:
+        fit = refine(problem, _carried_on(fit), columns_of(free, problem.record, machine, knots=knots))
     inertia = Column("p", AT["inertia"])
     wide = replace(
         fit,
@@ -236,6 +241,16 @@ def _with_inertia(problem: Problem, machine: Machine, columns: tuple[Column, ...
     if wide.std("inertia") > OPEN_INERTIA * fit.machine.value("inertia"):
         return fit
     return refine(problem, fit.machine, wide.columns, first_jacobian=wide.jacobian)
+
+
+def _carried_on(fit: Fit) -> Machine:
+    """The machine with its load's mean where its windows went on behind what was fitted."""
+    knots = fit.machine.knots.copy()
+    for k, own in enumerate(knots):
+        fitted = [c.index for c in fit.columns if c.kind == "k" and c.window == k]
+        if fitted:
+            own[max(fitted) + 1 :] = own[fitted].mean()
+    return replace(fit.machine, knots=knots)
 
 
 def _run_up_s(record: Record) -> float:

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commissioner.estimation import fit
 from commissioner.estimation.fit import Fit, Problem, fitted_part, problem_of, residuals
 from commissioner.estimation.noisy_input import unbiased
 from commissioner.estimation.record import STATES, prepare
 from commissioner.records import RunningRecording
+from commissioner.running import nominal as nominal_fit
 from commissioner.running.diagnosis import diagnose
 from commissioner.running.lack import lack_of_fit, not_told
 from commissioner.running.nominal import nominal
@@ -109,3 +111,26 @@ def test_a_broken_bar_under_one_steady_load_is_named() -> None:
     assert [c.name for c in found.causes] == ["rotor_asymmetry"]
     assert found.causes[0].sizes["relative_asymmetry"][0] == pytest.approx(size, rel=0.02)
     assert found.parameters_after["rotor_resistance_ohm"].value == pytest.approx(FOUR["rotor_resistance"], rel=0.02)
+
+
+def test_the_nearest_inertia_is_chosen_from_little_and_the_answer_is_that_of_all(monkeypatch) -> None:
+    """Eleven steady seconds took 84 CPU-seconds, most of them for three inertias that are only a place to begin."""
+    seen = _running(
+        5000, inertia=0.03, load_constant=0.3, load_ripple_cos=0.1, voltage_noise_v=2.0, unbalance=0.02
+    )  # fmt: skip
+    problem, fits, marched, own = problem_of(prepare([seen], PLATE), 0.0), [], [], fit.jacobian
+
+    def counted(of: Problem, *others):
+        marched[-1] += sum(of.until)
+        return own(of, *others)
+
+    monkeypatch.setattr(fit, "jacobian", counted)
+    for seconds in (nominal_fit.TELLING_S, 0.4):
+        monkeypatch.setattr(nominal_fit, "TELLING_S", seconds)
+        marched.append(0)
+        fits.append(nominal(problem)[1])
+    whole, chosen = fits
+    assert marched[1] < 0.7 * marched[0]
+    assert chosen.chi2 < whole.chi2 + 5.0
+    for name in (*FOUR, "inertia"):
+        assert chosen.machine.value(name) == pytest.approx(whole.machine.value(name), abs=0.2 * whole.std(name))

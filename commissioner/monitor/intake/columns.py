@@ -6,16 +6,19 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.monitor.intake.findings import Finding, Findings
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
-from commissioner.records import RunningRecording, Signal
+from commissioner.records import ONE_CURRENT, ReadingNote, RunningRecording, Signal
 
 CURRENT_RANGE = (0.02, 3.0)
 """Of the rated current, rms."""
 VOLTAGE_RANGE = (0.1, 2.5)
 """Of a phase's rated voltage, rms: an inverter at reduced frequency, or line to line."""
+HILBERT_S, HILBERT_KAISER = 0.2, 6.0
+"""Reach of the filter that turns one current by a quarter of a turn, to either side, and its window: what lies above 10 Hz passes."""
 APART = 2.0
 """Factor between the smallest of one kind and the largest of the other, or the columns stay as they are named."""
 
@@ -108,3 +111,39 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Findin
         )
     i, v = groups
     return replace(recording, currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2])), findings
+
+
+def from_one_current(recording: RunningRecording) -> RunningRecording:
+    """A recording of one current with the three whose vector is its analytic signal, and a note of it; else as it is. Its ends
+    have none (NaN).
+
+    The vector keeps what modulates the current; what turns backwards in the motor's own is mirrored, and the phases are alike.
+    """
+    there = [k for k, x in enumerate(recording.currents_a) if np.any(np.nan_to_num(x))]
+    if len(there) != 1:
+        return recording
+    (k,) = there
+    own, rows = recording.currents_a[k], np.arange(recording.time_s.size)
+    good = np.isfinite(own)
+    vector = np.where(good, _analytic(np.interp(rows, rows[good], own[good]), recording.sample_period_s), np.nan)
+    u, v, w = (np.real(vector * np.exp(-2j * np.pi / 3 * (j - k))) for j in range(3))
+    note = ReadingNote(
+        ONE_CURRENT,
+        f"one current only, of phase {'uvw'[k]}: the phases are taken for alike. A line at f Hz in it may be the mirror image of one at "
+        "twice the supply's frequency less or more f: two or three currents tell",
+    )
+    return replace(recording, currents_a=(u, v, w), notes=(*recording.notes, note))
+
+
+def _analytic(x: Signal, period_s: float) -> NDArray[np.complex128]:
+    """The signal without its mean, with its Hilbert transform as the imaginary part (a filter of finite length: that of the whole
+    signal carries what its ends lack through all of it); NaN where the filter reaches beyond an end."""
+    reach = min(round(HILBERT_S / period_s) if period_s > 0.0 else 0, x.size // 4)
+    n = np.arange(-reach, reach + 1)
+    kernel = np.where(n % 2 == 1, 2.0 / (np.pi * np.where(n == 0, 1, n)), 0.0) * np.kaiser(n.size, HILBERT_KAISER)
+    size = x.size + n.size
+    turned = np.fft.irfft(np.fft.rfft(x, size) * np.fft.rfft(kernel, size), size)[2 * reach : x.size]
+    vector = np.full(x.size, np.nan + 0j)
+    inner = slice(reach, x.size - reach)
+    vector[inner] = (x - x.mean())[inner] + 1j * turned
+    return vector

@@ -168,7 +168,9 @@ def _partly(
     if request.baseline is not None:
         entry = entry_of_part(seen, str(request.file))
         if entry is None:
-            document["withheld"]["trend"] = "a trend needs the speed at least, to compare like with like"
+            document["withheld"]["trend"] = (
+                "a trend needs the speed, to compare like with like, and the rotor's side bands or the phases"
+            )
         else:
             verdict, _ = update(request.baseline, entry, request.learn)
             document["trend"] = verdict_document(verdict)

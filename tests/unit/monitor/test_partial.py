@@ -291,3 +291,48 @@ def test_a_shaft_that_is_seen_tells_the_speed_where_a_slow_load_has_too_few_peri
     speed = document["mean_speed_rad_per_s"]
     assert "too few to tell a period" in document["withheld"]["waveforms"]
     assert speed["std"] < 0.1 and speed["value"] == pytest.approx(2 * np.pi * SHAFT_HZ, abs=3 * speed["std"])
+
+
+def of_phase(made: dict, phase: str) -> dict:
+    return {name: x for name, x in made.items() if not name.startswith("current_") or name == f"current_{phase}_a"}
+
+
+@pytest.mark.parametrize("phase", "uvw")
+def test_one_current_tells_speed_and_side_bands_and_nothing_of_the_phases(tmp_path: Path, phase: str) -> None:
+    """A clamp meter's recording: it was refused."""
+    made = of_phase(columns(), phase)
+    made[f"current_{phase}_a"] += 0.4  # a clamp's offset
+    made[f"current_{phase}_a"][3000:3004] = np.nan
+    document = watched(tmp_path, made, PLATE).document
+    speed = document["mean_speed_rad_per_s"]
+    assert speed["value"] == pytest.approx(2 * np.pi * SHAFT_HZ, abs=4 * speed["std"] + 1e-3) and speed["std"] < 0.1
+    assert document["indicators"]["current_rms_a"] == pytest.approx(5.6 / np.sqrt(2), rel=5e-3)
+    assert document["indicators"]["supply_frequency_hz"] == pytest.approx(50.0, abs=1e-3)
+    assert {"mean_torque_nm", "current_unbalance", "runs_backwards"} <= set(document["withheld"])
+    assert not {"current_unbalance", "runs_backwards"} & set(document["indicators"])
+    codes = [finding["code"] for finding in document["audit"]["findings"]]
+    assert codes.count("one_current") == 1 and "computed_current" not in codes
+    show_partial(document)
+
+
+def test_one_current_without_a_plate_tells_its_size_and_what_modulates_it(tmp_path: Path) -> None:
+    document = watched(tmp_path, of_phase(columns(), "v"), {}).document
+    assert document["periods"][0]["frequency_hz"] == pytest.approx(SHAFT_HZ, abs=0.05)
+    assert document["indicators"]["current_rms_a"] == pytest.approx(5.6 / np.sqrt(2), rel=5e-3)
+    assert "current_unbalance" in document["withheld"]
+
+
+def test_one_current_has_a_trend(tmp_path: Path) -> None:
+    baseline = tmp_path / "baseline.json"
+    for _ in range(2):
+        document = watched(tmp_path, of_phase(columns(), "u"), PLATE, baseline=baseline, learn=True).document
+    assert document["trend"] is not None
+
+
+def test_the_side_bands_of_one_current_are_those_of_three(tmp_path: Path) -> None:
+    made = swinging(2 * (50 - 2 * SHAFT_HZ))
+    levels = [
+        watched(tmp_path, x, PLATE).document["indicators"]["rotor_side_bands"] for x in (made, of_phase(made, "w"))
+    ]
+    assert levels[1]["level_db"] == pytest.approx(levels[0]["level_db"], abs=0.2)
+    assert levels[1]["above_floor_db"] > 20.0
