@@ -143,4 +143,3 @@ def from_nameplate(plate: Nameplate) -> TCircuit:
         rotor *= branch.real / admittance.real
     main = -1 / (w * min((admittance - branch).imag, -0.05 * abs(admittance)))
     return TCircuit(float(resistance), float(rotor), float(leakage), float(leakage), float(main))
-

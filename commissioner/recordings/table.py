@@ -331,8 +331,6 @@ def to_currents(table: Table) -> RunningRecording:
     empty = np.full(time.size, np.nan)
     u, v, w = (table.columns.get(name, empty) for name in CURRENTS)
     period = float(table.metadata.get("sample_period_s", 0.0) or _usual_step(time))
-    return RunningRecording(
-    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
     return from_one_current(RunningRecording(
         time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,
         table.source, table.notes,

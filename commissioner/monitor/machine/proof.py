@@ -96,4 +96,3 @@ def _periodic(basis: Vector, error: Vector, measured: Vector) -> float:
     fit = np.linalg.solve(gram + ridge, np.conj(basis.T) @ np.stack([error, measured], axis=1))
     power = np.sum(np.abs(fit) ** 2, axis=0) - np.abs(fit[0]) ** 2
     return float(np.sqrt(power[0] / power[1])) if count > basis.shape[1] and power[1] > 0 else float("nan")
-
