@@ -186,8 +186,8 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
 
 def _open_phase(current: Signal, cosines: Signal, size_a: float, noise_a: float) -> int | None:
     """The phase that carries nothing although the axis asks it to, while the other two carry one current, there and back; a sensor that is
-    silent leaves two that are no negatives of each other. None where there are two sensors: they cannot tell."""
-    if len(cosines) < 3 or _rms(current.sum(axis=0)) > OPEN_SHARE * size_a + noise_a:
+    silent leaves two that are no negatives of each other. Two sensors cannot tell: their sum is the third phase's."""
+    if _rms(current.sum(axis=0)) > OPEN_SHARE * size_a + noise_a:
         return None
     phase = int(np.argmin([_rms(one) for one in current]))
     carries_a, asked_a = _rms(current[phase]), abs(float(cosines[phase])) * size_a

@@ -74,6 +74,14 @@ EXPLAINED = {
         "commissioner.safety.sensors",
         "-phases.sum(axis=0) -> phases.sum(axis=0)",
     ): "only the magnitude of the third phase is looked at",
+    ("commissioner.safety.sensors", "self._gone_s < GONE_S"): ROUNDED,
+    ("commissioner.safety.sensors", "OPEN_SHARE * size_a + noise_a < asked_a -> carries_a <"): ROUNDED,
+    ("commissioner.safety.sensors", "_gone_s: float = 0.0"): "the first window sets it",
+    (
+        "commissioner.safety.sensors",
+        "QUIET = 3.0",
+    ): "chosen with room: an open phase shows one deviation, a current many",
+    ("commissioner.safety.sensors", ": 60.0 -> "): "chosen with room: 60 deviations or 61",
     (
         "commissioner.motor.plate_match",
         "ratios = [a / b for a, b in zip(machine.as_tuple(), typical.as_tuple(), strict=True)]",

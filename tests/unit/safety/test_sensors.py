@@ -422,3 +422,9 @@ def test_voltage_that_drove_no_current_yet_is_no_current_that_stopped():
     """A climb through an inverter's dead band, and the end of a test: its voltage is small before its current is."""
     reason, _ = stopping(9.0, lambda t: 10.0 * t, lambda t: np.maximum(t - 0.8, 0.0), 2.0)
     assert reason is None
+
+
+def test_a_smaller_voltage_than_drove_the_current_may_drive_none():
+    """What an inverter loses takes all of it, as on the way down."""
+    reason, _ = stopping(0.6, lambda t: np.where(t < 0.6, 20.0, 10.0), lambda t: 4.0 + 0.0 * t, 2.0)
+    assert reason is None
