@@ -147,8 +147,10 @@ def _here() -> int:
 
 
 def _new_token() -> int:
-    """32 bits, neither none (no claim) nor all of them (no value)."""
-    return _here() << 8 | secrets.randbelow(0xFE) + 1
+    """32 bits, neither none (no claim) nor all of them (no value), nor those of a record that lies here: by chance alone one in 254 was."""
+    taken = {held.token for path in locks_folder().glob("*.json") if (held := _holder(path)) is not None}
+    tokens = [_here() << 8 | low for low in range(1, 0xFF)]
+    return secrets.choice([token for token in tokens if token not in taken] or tokens)
 
 
 def holder_of(url: DriveUrl, profile: DriveProfile) -> Holder | None:

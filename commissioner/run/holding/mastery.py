@@ -34,7 +34,7 @@ class Mastery:
         """DriveInUse where the drive's own register says that it is somebody else's. True where a killed run of this
         computer left its claim there. Changes nothing."""
         claimed = self._inverter.claim.holder()
-        if claimed is None or claimed.token == self._lock.holder.token:
+        if claimed is None or (self._is_claimed and claimed.token == self._lock.holder.token):
             return False
         local, is_alive = find_holder(claimed.token)
         if local is None and not is_of_here(claimed.token):

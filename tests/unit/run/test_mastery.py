@@ -1,5 +1,6 @@
 """Whose a claim in the drive is: another computer's, a process's of this one, or what a killed run left there."""
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
@@ -79,3 +80,19 @@ def test_a_process_of_this_computer_that_reached_the_drive_under_another_address
         theirs.name_run("20260101-000000-simulated")
         with pytest.raises(DriveInUse, match="run 20260101-000000-simulated"):
             master(register, ours).take(IDENTITY)
+
+
+def test_no_two_locks_of_this_computer_have_one_token():
+    """Of 254: forty drawn blindly have a pair in 96 of 100, and whoever has a pair's token takes the other's drive for its own."""
+    with ExitStack() as held:
+        tokens = {held.enter_context(lock(port)).holder.token for port in range(600, 640)}
+    assert len(tokens) == 40
+
+
+def test_a_claim_that_happens_to_have_our_token_is_no_claim_of_ours():
+    register = Register()
+    with lock(502) as ours:
+        register.token = ours.holder.token
+        with pytest.raises(DriveInUse):
+            master(register, ours).take(IDENTITY)
+        assert register.token == ours.holder.token
