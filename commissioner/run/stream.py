@@ -49,9 +49,11 @@ class Stream:
         block, self._waiting = self._waiting or self._await_block(longest_s), None
         if block is None or self.is_over:
             return block
+        age_s = math.inf
         for _ in range(CATCH_UP_WINDOWS - 1):
-            if self._age_s(block) < CATCH_UP_S + WINDOWS * self._took_s:
-                break
+            before_s, age_s = age_s, self._age_s(block)
+            if age_s < CATCH_UP_S + WINDOWS * self._took_s or age_s >= before_s:
+                break  # not behind, or getting no nearer: a link slower than its samples is for the watch to judge, at once
             more = self._fetch()
             if more is None:
                 break

@@ -39,6 +39,7 @@ class _Deadline(ModbusTcpClient):
 
     _end = 0.0
     _asked, _units = 0, frozenset[int]()
+    _transaction = b""
     received = bytearray()
     """As of a serial line."""
 
@@ -46,8 +47,18 @@ class _Deadline(ModbusTcpClient):
         """The device whose answer came since the last request was sent, where it was not the one that was asked."""
         return next(iter(self._units - {self._asked}), None)
 
+    def part(self) -> str:
+        """What the head of an answer of our device tells that came since and was not whole or not to this request; empty without one."""
+        head = bytes(self.received[: UNIT + 1])
+        if len(head) <= UNIT or head[2:4] != b"\0\0" or head[UNIT] != self._asked:
+            return ""
+        if head[:2] != self._transaction:
+            return f"an answer to transaction {int.from_bytes(head[:2])}, not {int.from_bytes(self._transaction)}"
+        return f"{len(self.received)} of the answer's {UNIT + int.from_bytes(head[4:6])} bytes"
+
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
         wanted = self.comm_params.timeout_connect
+        self._transaction = request[:2]
         self._asked, self._units, self.received = request[UNIT], frozenset(), bytearray()
         self._end = time.monotonic() + wanted
         if self.socket is None:
@@ -144,6 +155,10 @@ class SerialClient(ModbusSerialClient):
         data = bytes(self.received)
         seen = {data[k] for k in range(len(data)) if 0 < data[k] <= LAST_DEVICE and data[k] != self.device}
         return next((device for device in sorted(seen) if find_answers(data, device)), None)
+
+    def part(self) -> str:
+        """As over TCP; without a transaction's number nothing tells."""
+        return ""
 
     def waiting(self) -> int:
         """Bytes on the line that nobody has read; 0 where the line is gone, which the next request will tell."""

@@ -389,6 +389,9 @@ class ModbusPort:
         other = self._client.other_device()
         if other is not None:
             return f"an answer of device {other}"
+        part = self._client.part()
+        if part:
+            return f"{part} in {self.reply_timeout_s:g} s"
         if self._client.received:
             return f"{len(self._client.received)} bytes that are no Modbus answer to it"
         return f"nothing in {self.reply_timeout_s:g} s"
@@ -404,9 +407,8 @@ class ModbusPort:
             line = f"{self._url.baud} Bd, parity {self._url.parity}, {self._url.stop_bits} stop"
             where = f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
         else:
-            wrong_port = (
-                "see that Modbus TCP, and nothing else, answers on this port; " if self._client.received else ""
-            )
+            is_other = self._client.received and not self._client.part()
+            wrong_port = "see that Modbus TCP, and nothing else, answers on this port; " if is_other else ""
             where = (
                 f"{wrong_port}check the drive's supply, the cable, and that device={self._device} is its number there"
             )
