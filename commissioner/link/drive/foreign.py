@@ -56,13 +56,13 @@ class Watched:
             self._count = (self._count + 1) & 0xFFFF
         self._ours |= {name: values[name] for name in names}
         self._unseen |= {"control_word"} & set(names)
-        if any(item.name in ("commit", "store") for item in span.items):
-            self.forget_parameters()
+        self._forget_if_applied(span)
 
     def lost(self, span: Span, values: Mapping[str, Value]) -> None:
         """One request that the drive may have carried out: what it holds tells, before the next status counts."""
         self._count = None
         self._perhaps |= {name: values[name] for name in _counted(span)}
+        self._forget_if_applied(span)
 
     def found(self, parameters: Mapping[str, Value]) -> None:
         """Motor parameters as they were read: they are to stay so."""
@@ -74,6 +74,10 @@ class Watched:
             for prefix in ("", "stored_"):
                 self._ours.pop(prefix + name, None)
         self._count = None
+
+    def _forget_if_applied(self, span: Span) -> None:
+        if any(item.name in ("commit", "store") for item in span.items):
+            self.forget_parameters()
 
     def judge(self, count: int | None, read: Callable[[Iterable[str]], Mapping[str, Value]]) -> None:
         """ForeignMaster where the drive is not as we left it. Settings are read only where the counts differ."""

@@ -41,6 +41,8 @@ EXCEPTION_MEANINGS = {
     11: "gateway target did not answer",
 }
 """MODBUS Application Protocol Specification V1.1b3, section 7; 7: Modicon's PI-MBUS-300 reference guide, appendix A."""
+HOST_STOPPED = 2.0
+"""A request is given up after the time for a reply: where one took so many times as long, it was this host that stood still."""
 NOT_CARRIED_OUT = frozenset({6, 10})
 """Busy, or no way to the device: asked again, whatever it was, until the time for a reply is over."""
 BUSY_PAUSE_S = 0.01
@@ -329,7 +331,11 @@ class ModbusPort:
             raise
         finally:
             self._answered_s = self._clock()
-        self.stats.latencies_s.append(self._answered_s - start)
+            took_s = self._answered_s - start
+            if took_s > HOST_STOPPED * self.reply_timeout_s:
+                self.stats.longest_gap_s = max(self.stats.longest_gap_s, took_s)
+        if took_s <= HOST_STOPPED * self.reply_timeout_s:
+            self.stats.latencies_s.append(took_s)
         self._expect(what, (reply.dev_id, reply.function_code & 0x7F), (self._device, shape[0]))
         if reply.isError():
             self._refused(what, reply.exception_code, is_read=shape[0] in READING)

@@ -354,3 +354,23 @@ def test_how_long_this_host_did_not_ask_is_kept():
         port.read(100, 1)
         port.close()
     assert port.stats.longest_gap_s >= 0.06
+
+
+def test_a_host_that_slept_while_it_waited_is_no_slow_link():
+    slept_s = 0.0
+
+    def answer(_request, frame):
+        nonlocal slept_s
+        slept_s = 5.0
+        return [frame]
+
+    with TcpDevice(Bank()) as device:
+        url = TcpUrl("127.0.0.1", device.port)
+        clock = lambda: time.monotonic() + slept_s  # noqa: E731
+        port = ModbusPort(url, PROFILE, reply_timeout_s=0.25, connect_timeout_s=1.0, clock=clock)
+        port.read(100, 1)
+        device.script = answer
+        port.read(100, 1)
+        port.close()
+    assert port.stats.longest_gap_s >= 5.0
+    assert port.stats.latency_s(1.0) < 0.25
