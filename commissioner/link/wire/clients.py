@@ -23,6 +23,7 @@ LONGEST_READ = 4096
 UNIT = 6
 """Where the device's number stands in a TCP frame, behind transaction, protocol and length."""
 LAST_DEVICE = 247
+READ = b"\x03"
 SILENCE_S = 0.05
 """A frame has no hole this long: USB converters hold bytes back for 16 ms at most by default (FTDI AN232B-04)."""
 
@@ -120,6 +121,7 @@ class SerialClient(ModbusSerialClient):
 
     device = 1
     received = bytearray()
+    sent = b""
 
     def connect(self) -> bool:
         if self.socket is None:
@@ -136,8 +138,12 @@ class SerialClient(ModbusSerialClient):
         return True
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
-        self.received = bytearray()
+        self.received, self.sent = bytearray(), bytes(request)
         return super().send(request, addr)
+
+    def hears_itself(self) -> bool:
+        """Whether the line gave back a request to read, whose answer never looks like it; one to write a register looks like its answer."""
+        return self.sent[1:2] == READ and self.sent in self.received
 
     def recv(self, size: int | None) -> bytes:
         """One whole answer; empty where none came in time, or where the line fell silent after something else."""
