@@ -214,8 +214,8 @@ def test_a_link_that_has_become_slower_than_its_samples_is_seen_before_eight_mor
     assert age_s < 0.5 + 4 * 0.12  # at the most three windows and a status after the one that was still young enough
 
 
-@pytest.mark.parametrize("took_s", [0.001, 0.002, 0.004, 0.0075])
-def test_a_host_that_was_behind_catches_up_in_one_go_while_windows_come_faster_than_samples(monkeypatch, took_s):
+@pytest.mark.parametrize("took_s", [0.001, 0.002, 0.004, 0.0075, 0.012])
+def test_a_host_that_was_behind_catches_up_in_one_go(monkeypatch, took_s):
     block = streamed(Full(took_s, behind_s=0.15), monkeypatch).next_block(0.5)
     assert block.count == 8 * 16
 
