@@ -103,8 +103,10 @@ def with_host(error: CommissionerError, gap_s: float, watchdog_s: float | None) 
     """What broke while energised, and that this host was late: `gap_s` between an answer and its own next request is a good
     part of what the drive's watchdog grants."""
     if isinstance(error, DriveError) and watchdog_s is not None and gap_s >= LATE_SHARE * watchdog_s:
-        error.what += f"; this host was late: {gap_s:.2g} s passed between an answer and its next request"
-        error.remedy = f"end other programs on this host, or use one that is less busy; {error.remedy}"
+        error.what += f"; this host was late: it did nothing for {gap_s:.2g} s"
+        error.remedy = (
+            f"keep this host from sleeping and end other programs on it, or use one that is less busy; {error.remedy}"
+        )
     return error
 
 
@@ -121,10 +123,12 @@ def with_link(error: CommissionerError, answer_s: float, watchdog_s: float | Non
 def write_lost(failure: OSError, folder: RunFolder) -> WriteBackFailed:
     """The disk took no more in the middle of a write-back or a restore."""
     lost = archive_lost(folder.path, failure, "; the drive holds its old or its new parameters")
-    return WriteBackFailed(
-        lost.what, step=lost.step, value=lost.value, limit=lost.limit, unit=lost.unit,
-        remedy="make room, then `commissioner restore` this run",
-    )  # fmt: skip
+    remedy = (
+        "bring the run's folder back, then `commissioner restore` this run"
+        if isinstance(failure, FileNotFoundError)
+        else "make room, then `commissioner restore` this run"
+    )
+    return WriteBackFailed(lost.what, step=lost.step, value=lost.value, limit=lost.limit, unit=lost.unit, remedy=remedy)
 
 
 def note(folder: RunFolder, kind: str, record: object) -> None:

@@ -25,6 +25,8 @@ ROOM = 1.2
 """More room in a window than samples can be there: some are made while the request is under way."""
 CATCH_UP_S, CATCH_UP_WINDOWS = 0.02, 8
 """Behind by this much: so many windows are read before anything is computed from them."""
+CATCH_UP_LONGEST_S = 0.1
+"""Of reading them: a link that has become slower than its samples is for the watch to judge."""
 
 
 class Stream:
@@ -49,8 +51,9 @@ class Stream:
         block, self._waiting = self._waiting or self._await_block(longest_s), None
         if block is None or self.is_over:
             return block
+        end_s = self._inverter.now_s() + CATCH_UP_LONGEST_S
         for _ in range(CATCH_UP_WINDOWS - 1):
-            if self._age_s(block) < CATCH_UP_S + WINDOWS * self._took_s:
+            if self._age_s(block) < CATCH_UP_S + WINDOWS * self._took_s or self._inverter.now_s() > end_s:
                 break
             more = self._fetch()
             if more is None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from commissioner.errors import DriveFault, ForeignMaster
 from commissioner.registers.codec import Value, held_words
 from commissioner.registers.profile import DriveProfile, Span
+from commissioner.text import counted
 
 GUARDED = (
     "control_word", "mode", "watchdog_ms", "current_limit_a", "test_time_limit_s", "voltage_limit_v", "axis_deg", "dc_bias_v",
@@ -39,6 +40,8 @@ class Watched:
     def __init__(self, profile: DriveProfile) -> None:
         self._profile = profile
         self._ours: dict[str, Value] = {}
+        self._perhaps: dict[str, Value] = {}
+        """Written by us without an answer: the drive holds this, or what it held before."""
         self._count: int | None = None
         self._unseen: set[str] = set()
         """Commands whose effect was not looked at yet: a drive that ignores one has no other master."""
@@ -46,15 +49,20 @@ class Watched:
 
     def wrote(self, span: Span, values: Mapping[str, Value]) -> None:
         """One request that the drive has acknowledged."""
-        names = [item.name for item in span.items if item.name not in UNCOUNTED]
+        names = _counted(span)
         if any(self._is_new(name, values[name]) is None for name in names):
             self._count = None  # what was there before is not known: nor is whether it counted
         elif self._count is not None and any(self._is_new(name, values[name]) for name in names):
             self._count = (self._count + 1) & 0xFFFF
         self._ours |= {name: values[name] for name in names}
         self._unseen |= {"control_word"} & set(names)
-        if any(item.name in ("commit", "store") for item in span.items):
-            self.forget_parameters()
+        self._forget_if_applied(span)
+
+    def lost(self, span: Span, values: Mapping[str, Value]) -> None:
+        """One request that the drive may have carried out: what it holds tells, before the next status counts."""
+        self._count = None
+        self._perhaps |= {name: values[name] for name in _counted(span)}
+        self._forget_if_applied(span)
 
     def found(self, parameters: Mapping[str, Value]) -> None:
         """Motor parameters as they were read: they are to stay so."""
@@ -67,16 +75,28 @@ class Watched:
                 self._ours.pop(prefix + name, None)
         self._count = None
 
+    def _forget_if_applied(self, span: Span) -> None:
+        if any(item.name in ("commit", "store") for item in span.items):
+            self.forget_parameters()
+
     def judge(self, count: int | None, read: Callable[[Iterable[str]], Mapping[str, Value]]) -> None:
         """ForeignMaster where the drive is not as we left it. Settings are read only where the counts differ."""
         if not self.is_armed:
             return
         if count is None or count != self._count:
             held = read(self._watched_names())
-            self._ours |= {name: held[name] for name in self._unseen & set(held)}
-            self._compare(held, count)
+            self._settle(held)
+            self._compare({name: value for name, value in held.items() if name in self._ours}, count)
             self._count = count
         self._unseen.clear()
+
+    def _settle(self, held: Mapping[str, Value]) -> None:
+        """What the drive holds tells what became of commands that were not looked at and of writes without an answer."""
+        done = {
+            name for name in self._perhaps.keys() & held.keys() if self._same(name, self._perhaps[name], held[name])
+        }
+        self._ours |= {name: held[name] for name in (self._unseen & held.keys()) | done}
+        self._perhaps.clear()
 
     def _compare(self, held: Mapping[str, Value], count: int | None) -> None:
         changes = [Change(n, self._ours[n], v) for n, v in held.items() if not self._same(n, self._ours[n], v)]
@@ -97,7 +117,8 @@ class Watched:
     def _watched_names(self) -> list[str]:
         parameters = self._profile.parameter_names
         names = (*GUARDED, *parameters, *(f"{p}{name}" for p in ("staged_", "stored_") for name in parameters))
-        return [name for name in names if name in self._ours and name in self._profile.items]
+        known = self._ours.keys() | self._perhaps.keys()
+        return [name for name in names if name in known and name in self._profile.items]
 
     def _is_new(self, name: str, value: Value) -> bool | None:
         """True where our write changes the item; None where it is not known what it held."""
@@ -106,6 +127,11 @@ class Watched:
     def _same(self, name: str, first: Value, second: Value) -> bool:
         item = self._profile.item(name)
         return held_words(item, first) == held_words(item, second)
+
+
+def _counted(span: Span) -> list[str]:
+    """The settings among a request's items."""
+    return [item.name for item in span.items if item.name not in UNCOUNTED]
 
 
 def _has_restarted(held: Mapping[str, Value], ours: Mapping[str, Value]) -> bool:
@@ -118,7 +144,7 @@ def _has_restarted(held: Mapping[str, Value], ours: Mapping[str, Value]) -> bool
 def _another_master(changes: list[Change], writes: int) -> ForeignMaster:
     what = (
         "; ".join(change.words for change in changes[:4])
-        or f"{writes} settings, which hold our values again or are none of ours"
+        or f"{counted(writes, 'setting')}, back at our values or none of ours"
     )
     first = changes[0] if changes else None
     return ForeignMaster(

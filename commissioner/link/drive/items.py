@@ -69,7 +69,7 @@ class Items:
             try:
                 seen = self.port.exchange(span.address, words, span.address, span.count)
             except (ReplyTimeout, ReplyMismatch):
-                self.watched.look_again()
+                self.watched.lost(span, values)
                 seen = self.port.read(span.address, span.count)
                 if seen != words:
                     raise
@@ -105,7 +105,7 @@ class Items:
             if refused.value not in MAY_BE_CARRIED_OUT or refused.value in self.profile.exceptions:
                 raise
         except BaseException:  # it may have arrived all the same
-            self.watched.look_again()
+            self.watched.lost(span, values)
             raise
         self.watched.wrote(span, values)
 

@@ -23,6 +23,7 @@ LONGEST_READ = 4096
 UNIT = 6
 """Where the device's number stands in a TCP frame, behind transaction, protocol and length."""
 LAST_DEVICE = 247
+READ = b"\x03"
 SILENCE_S = 0.05
 """A frame has no hole this long: USB converters hold bytes back for 16 ms at most by default (FTDI AN232B-04)."""
 
@@ -39,6 +40,7 @@ class _Deadline(ModbusTcpClient):
 
     _end = 0.0
     _asked, _units = 0, frozenset[int]()
+    _transaction = b""
     received = bytearray()
     """As of a serial line."""
 
@@ -46,8 +48,18 @@ class _Deadline(ModbusTcpClient):
         """The device whose answer came since the last request was sent, where it was not the one that was asked."""
         return next(iter(self._units - {self._asked}), None)
 
+    def part(self) -> str:
+        """What the head of an answer of our device tells that came since and was not whole or not to this request; empty without one."""
+        head = bytes(self.received[: UNIT + 1])
+        if len(head) <= UNIT or head[2:4] != b"\0\0" or head[UNIT] != self._asked:
+            return ""
+        if head[:2] != self._transaction:
+            return f"an answer to transaction {int.from_bytes(head[:2])}, not {int.from_bytes(self._transaction)}"
+        return f"{len(self.received)} of the answer's {UNIT + int.from_bytes(head[4:6])} bytes"
+
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
         wanted = self.comm_params.timeout_connect
+        self._transaction = request[:2]
         self._asked, self._units, self.received = request[UNIT], frozenset(), bytearray()
         self._end = time.monotonic() + wanted
         if self.socket is None:
@@ -109,6 +121,7 @@ class SerialClient(ModbusSerialClient):
 
     device = 1
     received = bytearray()
+    sent = b""
 
     def connect(self) -> bool:
         if self.socket is None:
@@ -125,8 +138,12 @@ class SerialClient(ModbusSerialClient):
         return True
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
-        self.received = bytearray()
+        self.received, self.sent = bytearray(), bytes(request)
         return super().send(request, addr)
+
+    def hears_itself(self) -> bool:
+        """Whether the line gave back a request to read, whose answer never looks like it; one to write a register looks like its answer."""
+        return self.sent[1:2] == READ and self.sent in self.received
 
     def recv(self, size: int | None) -> bytes:
         """One whole answer; empty where none came in time, or where the line fell silent after something else."""
@@ -144,6 +161,10 @@ class SerialClient(ModbusSerialClient):
         data = bytes(self.received)
         seen = {data[k] for k in range(len(data)) if 0 < data[k] <= LAST_DEVICE and data[k] != self.device}
         return next((device for device in sorted(seen) if find_answers(data, device)), None)
+
+    def part(self) -> str:
+        """As over TCP; without a transaction's number nothing tells."""
+        return ""
 
     def waiting(self) -> int:
         """Bytes on the line that nobody has read; 0 where the line is gone, which the next request will tell."""

@@ -41,6 +41,8 @@ EXCEPTION_MEANINGS = {
     11: "gateway target did not answer",
 }
 """MODBUS Application Protocol Specification V1.1b3, section 7; 7: Modicon's PI-MBUS-300 reference guide, appendix A."""
+HOST_STOPPED = 2.0
+"""A request is given up after the time for a reply: where one took so many times as long, it was this host that stood still."""
 NOT_CARRIED_OUT = frozenset({6, 10})
 """Busy, or no way to the device: asked again, whatever it was, until the time for a reply is over."""
 BUSY_PAUSE_S = 0.01
@@ -329,7 +331,11 @@ class ModbusPort:
             raise
         finally:
             self._answered_s = self._clock()
-        self.stats.latencies_s.append(self._answered_s - start)
+            took_s = self._answered_s - start
+            if took_s > HOST_STOPPED * self.reply_timeout_s:
+                self.stats.longest_gap_s = max(self.stats.longest_gap_s, took_s)
+        if took_s <= HOST_STOPPED * self.reply_timeout_s:
+            self.stats.latencies_s.append(took_s)
         self._expect(what, (reply.dev_id, reply.function_code & 0x7F), (self._device, shape[0]))
         if reply.isError():
             self._refused(what, reply.exception_code, is_read=shape[0] in READING)
@@ -389,6 +395,9 @@ class ModbusPort:
         other = self._client.other_device()
         if other is not None:
             return f"an answer of device {other}"
+        part = self._client.part()
+        if part:
+            return f"{part} in {self.reply_timeout_s:g} s"
         if self._client.received:
             return f"{len(self._client.received)} bytes that are no Modbus answer to it"
         return f"nothing in {self.reply_timeout_s:g} s"
@@ -404,9 +413,8 @@ class ModbusPort:
             line = f"{self._url.baud} Bd, parity {self._url.parity}, {self._url.stop_bits} stop"
             where = f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
         else:
-            wrong_port = (
-                "see that Modbus TCP, and nothing else, answers on this port; " if self._client.received else ""
-            )
+            is_other = self._client.received and not self._client.part()
+            wrong_port = "see that Modbus TCP, and nothing else, answers on this port; " if is_other else ""
             where = (
                 f"{wrong_port}check the drive's supply, the cable, and that device={self._device} is its number there"
             )

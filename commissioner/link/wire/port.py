@@ -30,7 +30,8 @@ class LinkStats:
     waits: int = 0
     """Requests put again because the drive or a gateway was busy."""
     longest_gap_s: float = 0.0
-    """Longest time between an answer and the next request: what this host did not ask in. Whoever measures sets it to 0."""
+    """Longest time in which this host stood still: between an answer and the next request, or past every deadline of a request. Whoever
+    measures sets it to 0."""
     latencies_s: deque[float] = field(default_factory=lambda: deque(maxlen=2048))
 
     def latency_s(self, quantile: float) -> float:

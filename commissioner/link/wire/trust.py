@@ -108,6 +108,7 @@ class SerialTrust:
         self._debts = Debts(clock)
         self._asked: Shape = ()
         self._is_in_doubt = True
+        self._has_echo = False
         self._watch_until = -math.inf
 
     def ready(self) -> None:
@@ -191,6 +192,14 @@ class SerialTrust:
                 return
             except (ReplyTimeout, ReplyMismatch) as error:
                 failure = error
+        if self._has_echo:
+            raise ReplyTimeout(
+                f"{self._url}: the line gives back what this host sends",
+                step="resynchronise",
+                value="our own request",
+                limit="answers of the drive alone",
+                remedy="switch off the adapter's echo: on two wires its receiver has to be off while it sends",
+            ) from failure
         raise ReplyTimeout(
             f"{self._url}: the line does not come into step",
             step="resynchronise",
@@ -207,4 +216,5 @@ class SerialTrust:
             if not self._client.drain():
                 break
         self._debts.pay(self._answers())
+        self._has_echo |= self._client.hears_itself()
         self._client.received = bytearray()

@@ -118,11 +118,15 @@ def damaged(folder: Path, name: str, seen: str) -> DataRefused:
 
 
 def archive_lost(folder: Path, failure: OSError, so_far: str = "") -> CommissionerError:
-    """The disk took no more of a run."""
+    """The disk took no more of a run, or the run's folder is gone."""
+    remedy = (
+        "bring the folder that was removed, moved or unmounted back, or give another one with --runs, then start again"
+        if isinstance(failure, FileNotFoundError)
+        else "make room or give another folder with --runs, then start again"
+    )
     return CommissionerError(
         f"the run's archive cannot be written: {failure.strerror or failure}{so_far}", step="archive",
-        value=str(folder), limit="a disk with room that this user may write",
-        remedy="make room or give another folder with --runs, then start again",
+        value=str(folder), limit="a disk with room that this user may write", remedy=remedy,
     )  # fmt: skip
 
 

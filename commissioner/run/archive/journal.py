@@ -32,10 +32,12 @@ class Journal:
         whole = drop_torn_line(path)
         self.records = whole.count(b"\n")
         self.head = digest(whole.rstrip(b"\n").rpartition(b"\n")[2]) if whole else FIRST
+        self._path = path
         self._file: TextIO = open(path, "a", encoding="utf-8", newline="\n", opener=open_no_link)  # noqa: SIM115
 
     def write(self, kind: str, record: object, blocks: tuple[int, str], *, durable: bool) -> None:
-        """Append one record; `durable` returns only when it is on the disk."""
+        """Append one record; `durable` returns only when it is on the disk. FileNotFoundError: somebody removed, moved or
+        unmounted the folder, and what is written into the open file is lost."""
         line = {
             "n": self.records, "utc": dt.datetime.now(dt.UTC).isoformat(), "previous": self.head, "blocks": blocks,
             "kind": kind, "record": plain(record),
@@ -46,6 +48,7 @@ class Journal:
         self.records, self.head = self.records + 1, digest(text.encode())
         if durable:
             os.fsync(self._file.fileno())
+        self._path.stat()
 
     def close(self) -> None:
         with suppress(OSError):

@@ -72,6 +72,27 @@ def test_a_naive_client_takes_the_late_answer_for_the_next_one():
     assert fooled == [100, 200]
 
 
+@pytest.mark.parametrize("answers_after_s", [0.002, 0.01])
+def test_an_adapter_that_gives_back_what_it_sends_is_named(answers_after_s):
+    with RtuDevice(Bank()) as device:
+        device.script = lambda request, answer: [request, answers_after_s, answer]
+        port = connect(device)
+        with pytest.raises(ReplyTimeout) as caught:
+            port.read(100, 4)
+        port.close()
+    assert "gives back what this host sends" in caught.value.what
+    assert "echo" in caught.value.remedy
+
+
+def test_a_line_that_stays_out_of_step_without_an_echo_is_called_so():
+    with RtuDevice(Bank()) as device:
+        device.script = lambda request, answer: [answer + answer]
+        port = connect(device)
+        with pytest.raises(ReplyTimeout, match="does not come into step"):
+            port.read(100, 4)
+        port.close()
+
+
 @pytest.mark.parametrize("after", [1, 2, 3, 4, 5])
 def test_late_reply_is_not_taken_for_the_next_one(after):
     with RtuDevice(Bank()) as device:

@@ -219,6 +219,24 @@ def test_a_port_of_something_else_than_modbus_is_told():
     assert "see that Modbus TCP, and nothing else" in failure.value.remedy
 
 
+@pytest.mark.parametrize(
+    ("damage", "seen"),
+    [
+        (lambda frame: frame[:-1], "10 of the answer's 11 bytes in 0.1 s"),
+        (lambda frame: frame[:7], "7 of the answer's 11 bytes in 0.1 s"),
+        (lambda frame: b"\x7f\xff" + frame[2:], "an answer to transaction 32767, not 1 in 0.1 s"),
+    ],
+)
+def test_an_answer_that_trickles_or_is_another_requests_is_no_other_protocol(damage, seen):
+    with TcpDevice(Bank()) as device, closing(connect(device)) as port:
+        device.script = lambda request, frame: [damage(frame)]
+        with pytest.raises(LinkError) as failure:
+            port.read(100, 1)
+    assert failure.value.value == seen
+    assert "nothing else" not in failure.value.remedy
+    assert "reply=SECONDS" in failure.value.remedy
+
+
 def test_a_connection_closed_by_the_drive_is_reported_and_reopened_by_the_next_request():
     with TcpDevice(Bank()) as device:
         port = connect(device)
@@ -336,3 +354,23 @@ def test_how_long_this_host_did_not_ask_is_kept():
         port.read(100, 1)
         port.close()
     assert port.stats.longest_gap_s >= 0.06
+
+
+def test_a_host_that_slept_while_it_waited_is_no_slow_link():
+    slept_s = 0.0
+
+    def answer(_request, frame):
+        nonlocal slept_s
+        slept_s = 5.0
+        return [frame]
+
+    with TcpDevice(Bank()) as device:
+        url = TcpUrl("127.0.0.1", device.port)
+        clock = lambda: time.monotonic() + slept_s  # noqa: E731
+        port = ModbusPort(url, PROFILE, reply_timeout_s=0.25, connect_timeout_s=1.0, clock=clock)
+        port.read(100, 1)
+        device.script = answer
+        port.read(100, 1)
+        port.close()
+    assert port.stats.longest_gap_s >= 5.0
+    assert port.stats.latency_s(1.0) < 0.25

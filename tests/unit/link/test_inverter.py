@@ -1,5 +1,7 @@
 """The inverter against a drive in memory: set up, energise, steer, fetch, de-energise; a bad drive is found out."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -496,6 +498,38 @@ def test_steering_whose_answer_was_lost_goes_on_where_the_drive_took_it(bench):
     bench.drive.failures.append(timeout())
     with pytest.raises(ReplyTimeout):
         bench.inverter.set_scale(0.7)
+
+
+@pytest.mark.parametrize("was_done", [True, False])
+@pytest.mark.parametrize("name", ["limits", "stop"])
+def test_a_write_of_ours_whose_answer_was_lost_is_no_other_masters(bench, name, was_done):
+    running(bench)
+    if name == "limits":
+        bench.inverter.disarm()
+    bench.drive.fails_after_acting = was_done
+    bench.drive.failures.append(timeout())
+    if name == "stop":
+        assert bench.inverter.disarm().is_confirmed
+    else:
+        with nullcontext() if was_done else pytest.raises(ReplyTimeout):
+            bench.inverter.set_limits(current_a=5.0, voltage_v=90.0, time_s=60.0)
+    bench.inverter.read_status()
+    other_limit(bench.drive)
+    bench.drive.put("settings_count", bench.drive.get("settings_count") + 1)
+    with pytest.raises(ForeignMaster, match=r"changed current_limit_a from [58] to 50"):
+        bench.inverter.read_status()
+
+
+def test_a_setting_whose_first_writes_answer_was_lost_is_watched_all_the_same(bench):
+    bench.inverter.set_watchdog(500)
+    bench.drive.fails_after_acting = True
+    bench.drive.failures.append(timeout())
+    bench.inverter.set_limits(current_a=8.0, voltage_v=90.0, time_s=60.0)
+    bench.inverter.read_status()
+    other_limit(bench.drive)
+    bench.drive.put("settings_count", bench.drive.get("settings_count") + 1)
+    with pytest.raises(ForeignMaster, match="changed current_limit_a from 8 to 50"):
+        bench.inverter.read_status()
 
 
 @pytest.mark.parametrize("code", [5, 11])

@@ -3,16 +3,21 @@
 import dataclasses
 import errno
 import os
+import shutil
 import time
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from commissioner.errors import WriteBackFailed
 from commissioner.link.drive.facts import DisarmReport
+from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.url import parse_url
+from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
 from commissioner.run import commission
 from commissioner.run.archive.folder import RunFolder
@@ -21,6 +26,7 @@ from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
+from commissioner.safety.limits import SafetyFacts
 from commissioner.settings import load_motor, load_procedure
 from tests.support.scripted_port import ScriptedDrive
 
@@ -121,6 +127,31 @@ def test_a_defect_on_a_full_disk_still_lets_the_drive_go(folder):
 
     ended = perform(drive, folder, course())
     assert drive.disarmed == 1 and ended.outcome == "faulted" and "ZeroDivisionError" in ended.reason
+
+
+@pytest.mark.parametrize("goes_by", [shutil.rmtree, lambda path: path.rename(path.with_name("elsewhere"))])
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder whose files are open")
+def test_a_run_whose_folder_is_gone_energises_and_writes_nothing_more(tmp_path, goes_by):
+    """The files that are open take what is written all the same; the snapshot that would bring the old parameters back is lost."""
+    folder, drive = RunFolder.create(tmp_path, "gone"), ScriptedDrive()
+    inverter = Inverter(drive, load_profile("simulated"), partial(commission._announce, folder))
+    plate = load_motor("motor_2kw2")
+    box = prior(plate)
+    bounds = SimpleNamespace(parameters=box)
+    runner = Runner(inverter, folder, bounds, watch=None, present=lambda record: None)
+    runner._progress.facts = SafetyFacts(checks_passed=True, snapshot_taken=True, writing_allowed=True)
+    runner._snapshot = inverter.snapshot()
+
+    def course():
+        goes_by(folder.path)
+        yield ask.WriteParameters(box.typical, plate)
+        return RunEnded("commissioned", "written", 0.0)
+
+    ended = runner.perform(course())
+    folder.close()
+    assert ended.outcome == "faulted"
+    assert ended.error["step"] == "archive" and "bring the run's folder back" in ended.error["remedy"]
+    assert drive.written("commit") == drive.written("staged_stator_resistance") == []
 
 
 def test_a_disk_that_fills_up_while_writing_back_says_what_the_drive_may_hold(folder):

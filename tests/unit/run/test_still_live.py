@@ -5,6 +5,7 @@ import sys
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from commissioner.errors import Aborted, DriveFault, ReplyTimeout
@@ -12,6 +13,7 @@ from commissioner.link.drive.facts import DisarmReport, WriteReport
 from commissioner.link.wire.port import LinkStats
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
+from commissioner.records import SampleBlock
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.holding.priority import raised_priority
 from commissioner.run.runner import Runner
@@ -172,6 +174,52 @@ def test_a_stream_without_samples_ends_within_the_watchdogs_time(folder):
     assert time.monotonic() - began < 1.0
 
 
+class Full(Drive):
+    """In a time of its own: every window is full, takes `took_s` to come and brings 8 ms of samples that the drive made long ago."""
+
+    def __init__(self, took_s, behind_s=0.0):
+        super().__init__(live_from=9)
+        self.took_s, self.time_s = took_s, behind_s
+
+    def now_s(self):
+        return self.time_s
+
+    def sleep(self, seconds):
+        self.time_s += seconds
+
+    def fetch(self, cursor, most):
+        self.time_s += self.took_s
+        count = min(16, int(self.time_s / 5e-4) - cursor.next_index)
+        block = SampleBlock(7, cursor.next_index, 5e-4, 0.0, *[np.zeros(count)] * 3, None, 560.0) if count else None
+        moved = SimpleNamespace(stream=cursor.stream, next_index=cursor.next_index + count)
+        return SimpleNamespace(cursor=moved, block=block, has_ended=False)
+
+    def read_status(self):
+        self.time_s += self.took_s
+        return SimpleNamespace(samples_produced=0)
+
+
+def streamed(drive, monkeypatch):
+    monkeypatch.setattr("commissioner.run.stream.judge_status", lambda status, watch: None)
+    stream = SimpleNamespace(averaged=1, sample_period_s=5e-4, samples_per_window=16)
+    sensors = SimpleNamespace(claim=lambda status: None)
+    return Stream(drive, SimpleNamespace(stream=stream, next_index=0), 0.0, sensors, watch=None)
+
+
+def test_a_link_that_has_become_slower_than_its_samples_is_seen_before_eight_more_windows_have_come(monkeypatch):
+    drive = Full(took_s=0.12)
+    stream = streamed(drive, monkeypatch)
+    while (age_s := stream.next_block(0.5).age_s) <= 0.5:
+        pass
+    assert age_s < 0.5 + 4 * 0.12  # at the most three windows and a status after the one that was still young enough
+
+
+@pytest.mark.parametrize("took_s", [0.001, 0.002, 0.004, 0.0075, 0.012])
+def test_a_host_that_was_behind_catches_up_in_one_go(monkeypatch, took_s):
+    block = streamed(Full(took_s, behind_s=0.15), monkeypatch).next_block(0.5)
+    assert block.count == 8 * 16
+
+
 @pytest.mark.parametrize(("gap_s", "is_named"), [(0.4, True), (0.1, False)])
 def test_a_fault_in_a_session_whose_host_was_late_says_so_with_its_longest_gap(folder, gap_s, is_named):
     def course():
@@ -185,7 +233,7 @@ def test_a_fault_in_a_session_whose_host_was_late_says_so_with_its_longest_gap(f
     drive.port.stats.longest_gap_s = gap_s
     ended = runner.perform(course())
     assert ended.outcome == "faulted"
-    assert ("this host was late: 0.4 s" in ended.reason) is is_named
+    assert ("this host was late: it did nothing for 0.4 s" in ended.reason) is is_named
     assert ("less busy" in ended.error["remedy"]) is is_named
 
 
