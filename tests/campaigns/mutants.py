@@ -75,6 +75,14 @@ EXPLAINED = {
         "-phases.sum(axis=0) -> phases.sum(axis=0)",
     ): "only the magnitude of the third phase is looked at",
     ("commissioner.safety.sensors", "self._gone_s < GONE_S"): ROUNDED,
+    ("commissioner.safety.sensors", "size_a > FLOWED * noise_a + self._step_a -> size_a >= "): ROUNDED,
+    ("commissioner.safety.sensors", "size_a > SIGMAS * noise_a + self._step_a -> size_a >= "): ROUNDED,
+    ("commissioner.safety.sensors", "volts_v >= AS_MUCH * drove_v -> volts_v > "): ROUNDED,
+    ("commissioner.safety.sensors", "OPEN_SHARE * size_a + noise_a -> _rms(current.sum(axis=0)) >= "): ROUNDED,
+    (
+        "commissioner.safety.sensors",
+        "_drove: tuple[float, int] = (0.0, 0)",
+    ): "a volt squared beside those of many windows",
     ("commissioner.safety.sensors", "OPEN_SHARE * size_a + noise_a < asked_a -> carries_a <"): ROUNDED,
     ("commissioner.safety.sensors", "_gone_s: float = 0.0"): "the first window sets it",
     (
