@@ -89,7 +89,7 @@ EXPLAINED = {
         "commissioner.safety.sensors",
         "QUIET = 3.0",
     ): "chosen with room: an open phase shows one deviation, a current many",
-    ("commissioner.safety.sensors", ": 60.0 -> "): "chosen with room: 60 deviations or 61",
+    ("commissioner.safety.sensors", "FLOWED, GONE_S = 60.0, 0.12"): "chosen with room: 60 deviations or 61",
     (
         "commissioner.motor.plate_match",
         "ratios = [a / b for a, b in zip(machine.as_tuple(), typical.as_tuple(), strict=True)]",

@@ -346,17 +346,17 @@ def test_the_drives_word_may_be_a_neighbours_by_five_standard_deviations_of_nois
     assert (watch.judge(a_block(peak_a=0.0)) is None) is passes
 
 
-def single_phase(phase, axis_deg):
+def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0):
     """Currents of a motor whose `phase` is open: the others carry one current, there and back, as their voltages drive it."""
 
     def damage(seen, start):
         forth, back = (other for other in range(3) if other != phase)
         through = (seen[forth] - seen[back]) / 2.0
-        out = np.zeros_like(seen) + NOISE[:, start : start + seen.shape[1]]
+        out = noise * NOISE[:, start : start + seen.shape[1]]
         out[forth], out[back] = out[forth] + through, out[back] - through
         return out
 
-    return verdict(axis_deg=axis_deg, damage=damage, offset=(0.0, 0.0, 0.0))
+    return verdict(axis_deg=axis_deg, peak_a=peak_a, damage=damage, offset=(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -370,6 +370,13 @@ def test_an_open_phase_is_named_as_one_and_is_no_sensors_fault(phase, axis_deg):
     assert reason.value < 0.01
 
 
+@pytest.mark.parametrize(("peak_a", "noise"), [(3.0, 20.0), (8.0, 1.0)])
+def test_an_open_phase_is_named_beside_noise_and_at_any_size(peak_a, noise):
+    reason = single_phase(1, 0.0, peak_a, noise)
+    assert reason is not None
+    assert reason.what.startswith("phase v carries no current")
+
+
 @pytest.mark.parametrize("phase", [0, 1, 2])
 def test_a_silent_sensor_is_no_open_phase(phase):
     """Its phase carries a current, which the other two sensors do not add up to zero without."""
@@ -379,7 +386,7 @@ def test_a_silent_sensor_is_no_open_phase(phase):
     assert reason.is_fault
 
 
-def stopping(after, voltage_v, current_a, seconds=1.0, axis_deg=0.0):
+def stopping(after, voltage_v, current_a, seconds=1.0, axis_deg=0.0, step_a=1e-9):
     """A window watch over a current that is there until `after` (s), and the time of what it says."""
     watch, noise = SensorWatch(LIMIT_A), np.random.default_rng(5)
     cosines = np.array(phase_cosines(axis_deg))[:, None]
@@ -388,7 +395,7 @@ def stopping(after, voltage_v, current_a, seconds=1.0, axis_deg=0.0):
         on = time_s >= ZERO_S
         volts = np.where(on, voltage_v(time_s), 0.0)
         axis = np.where(on & (time_s < after), current_a(time_s), 0.0)
-        u, v, w = cosines * axis + noise.normal(0.0, 0.003, (3, ROWS))
+        u, v, w = step_a * np.round((cosines * axis + noise.normal(0.0, 0.003, (3, ROWS))) / step_a)
         block = SampleBlock(
             session=1, first_index=number * ROWS, sample_period_s=PERIOD_S, axis_deg=axis_deg, voltage_axis_v=volts, current_u_a=u,
             current_v_a=v, current_w_a=w, dc_link_v=540.0, lost_before=0, clipped=False,
@@ -422,9 +429,21 @@ def test_a_current_that_only_passes_through_zero_has_not_stopped(hertz):
     assert reason is None
 
 
-def test_voltage_that_drove_no_current_yet_is_no_current_that_stopped():
+@pytest.mark.parametrize("step_a", [1e-9, 0.05])
+def test_voltage_that_drove_no_current_yet_is_no_current_that_stopped(step_a):
     """A climb through an inverter's dead band, and the end of a test: its voltage is small before its current is."""
-    reason, _ = stopping(9.0, lambda t: 10.0 * t, lambda t: np.maximum(t - 0.8, 0.0), 2.0)
+    reason, _ = stopping(9.0, lambda t: 10.0 * t, lambda t: np.maximum(t - 0.8, 0.0), 2.0, step_a=step_a)
+    assert reason is None
+
+
+def test_a_current_that_stopped_is_seen_by_a_coarse_converter():
+    reason, seen_s = stopping(0.6, lambda t: 20.0 + 0.0 * t, lambda t: 4.0 + 0.0 * t, step_a=0.05)
+    assert reason is not None
+    assert seen_s < 0.8
+
+
+def test_a_current_that_is_back_after_a_twentieth_of_a_second_has_not_stopped():
+    reason, _ = stopping(9.0, lambda t: 20.0 + 0.0 * t, lambda t: np.where((t > 0.6) & (t < 0.65), 0.0, 4.0))
     assert reason is None
 
 
