@@ -346,14 +346,14 @@ def test_the_drives_word_may_be_a_neighbours_by_five_standard_deviations_of_nois
     assert (watch.judge(a_block(peak_a=0.0)) is None) is passes
 
 
-def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0):
+def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0, leak=0.0):
     """Currents of a motor whose `phase` is open: the others carry one current, there and back, as their voltages drive it."""
 
     def damage(seen, start):
         forth, back = (other for other in range(3) if other != phase)
         through = (seen[forth] - seen[back]) / 2.0
         out = noise * NOISE[:, start : start + seen.shape[1]]
-        out[forth], out[back] = out[forth] + through, out[back] - through
+        out[forth], out[back], out[phase] = out[forth] + through, out[back] - through, out[phase] + leak * through
         return out
 
     return verdict(axis_deg=axis_deg, peak_a=peak_a, damage=damage, offset=(0.0, 0.0, 0.0))
@@ -370,9 +370,13 @@ def test_an_open_phase_is_named_as_one_and_is_no_sensors_fault(phase, axis_deg):
     assert reason.value < 0.01
 
 
-@pytest.mark.parametrize(("peak_a", "noise"), [(3.0, 20.0), (8.0, 1.0)])
-def test_an_open_phase_is_named_beside_noise_and_at_any_size(peak_a, noise):
-    reason = single_phase(1, 0.0, peak_a, noise)
+@pytest.mark.parametrize(
+    "how",
+    [{"peak_a": 3.0, "noise": 20.0}, {"peak_a": 8.0}, {"peak_a": 8.0, "leak": 0.06}],
+    ids=["noise", "large", "leak"],
+)
+def test_an_open_phase_is_named_beside_noise_and_a_leak_and_at_any_size(how):
+    reason = single_phase(1, 0.0, **how)
     assert reason is not None
     assert reason.what.startswith("phase v carries no current")
 
@@ -447,7 +451,10 @@ def test_a_current_that_is_back_after_a_twentieth_of_a_second_has_not_stopped():
     assert reason is None
 
 
-def test_a_smaller_voltage_than_drove_the_current_may_drive_none():
-    """What an inverter loses takes all of it, as on the way down."""
-    reason, _ = stopping(0.6, lambda t: np.where(t < 0.6, 20.0, 10.0), lambda t: 4.0 + 0.0 * t, 2.0)
+@pytest.mark.parametrize("step_a", [1e-9, 0.5])
+def test_a_smaller_voltage_than_drove_the_current_may_drive_none(step_a):
+    """What an inverter loses takes all of it, as on the way down, however long that lasts."""
+    reason, _ = stopping(
+        0.6, lambda t: np.where(t < 0.6, 20.0, 10.0), lambda t: 4.0 + np.sin(300.0 * t), 14.0, step_a=step_a
+    )
     assert reason is None
