@@ -22,6 +22,8 @@ SI = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency": "H
       "angle": "deg", "apparent": "VA"}  # fmt: skip
 """The unit of a column whose cells have several prefixes and whose name has none."""
 _CELL = re.compile(rf"({NUMBER.pattern})\s*([^\d\s.,+-].*)")
+_NUMBER_AND_WORD = re.compile(r"\d\s*(?![eEdD][+-]?\d)[^\W\d_]|\d\s*[%°(/\[]")
+"""What a line without any such cell lacks: nearly every line of nearly every file, and to look at its cells takes a hundred times as long."""
 WHOLE_POWER = 1e-9
 """By which a factor's logarithm may miss a whole number: digits stay as they stand, for these tell how well a value is known."""
 
@@ -50,8 +52,9 @@ def united(text: str, source: str) -> str:
     """The text with numbers alone below names with their units; any other text as it is. DataRefused: a cell's unit measures something
     else than its column's."""
     lines = [line for line in head_lines(text) if line.text.strip()]
+    may_be = [_NUMBER_AND_WORD.search(line.text) is not None for line in lines]
     for k, line in enumerate(lines):
-        for mark in MARKS if not line.text.startswith("#") else ():
+        for mark in MARKS if any(may_be[k : k + HEAD_ROWS]) and not line.text.startswith("#") else ():
             rows = [split(one.text, mark) for one in lines[k : k + HEAD_ROWS]]
             above = split(lines[k - 1].text.lstrip("# "), mark) if k else []
             if _are_united(rows, above):
@@ -68,13 +71,10 @@ def _are_united(rows: Sequence[Sequence[str]], above: Sequence[str]) -> bool:
         return False
     columns = list(zip(*rows, strict=True))
     measured = [{found[2].measures for cell in cells if (found := parts(cell))} for cells in columns]
+    if sum(map(bool, measured)) < LEAST_UNITED or any(len(one) > 1 for one in measured):
+        return False
     others = [cells for cells in columns if not all(is_numeric(cell) or parts(cell) for cell in cells)]
-    are_texts = known(above) > 1 and not any(map(is_quantity, chain(*others)))
-    return (
-        (not others or are_texts)
-        and sum(map(bool, measured)) >= LEAST_UNITED
-        and all(len(one) <= 1 for one in measured)
-    )
+    return not others or (known(above) > 1 and not any(map(is_quantity, chain(*others))))
 
 
 def _column(placed: tuple[int, Sequence[str]], above: Sequence[str]) -> _Column:
