@@ -53,6 +53,9 @@ class Column:
     window: int = 0
 
 
+INERTIA = Column("p", AT["inertia"])
+
+
 @dataclass(frozen=True)
 class Machine:
     """Numbers in fit coordinates (logarithms of the positive ones), first states (windows, states), knots of the load and their

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import (
+    INERTIA,
     LARGEST_STEP,
-    Column,
     Fit,
     Machine,
     Problem,
@@ -21,7 +21,7 @@ from commissioner.estimation.fit import (
     simulate,
 )
 from commissioner.estimation.noise import through_machine
-from commissioner.estimation.numbers import AT, FOUR, LOGARITHMIC, SHAPES
+from commissioner.estimation.numbers import FOUR, LOGARITHMIC, SHAPES
 from commissioner.estimation.record import SMOOTH_S, between, smoothed
 from commissioner.estimation.told import TOLD, inverse
 from commissioner.motor.nameplate import prior
@@ -31,7 +31,6 @@ MOST_SHIFTED = 0.05
 """Of chi-square: what a shift by noise may add. One that adds more is drawn along a load whose knots the recording hardly tells: under a belt
 it left 6.4 times the noise of a healthy motor that had been fitted to the noise, and called it unexplained."""
 
-INERTIA = Column("p", AT["inertia"])
 OF_ATTENUATION = 0.5
 """Of the logarithm by which noise makes an inertia too heavy: its standard deviation. From draw to draw it scatters by a third."""
 

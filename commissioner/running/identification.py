@@ -15,6 +15,7 @@ from scipy.optimize import lsq_linear
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import (
+    INERTIA,
     Column,
     Fit,
     Machine,
@@ -40,7 +41,7 @@ Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
 """Between speeds that count as independent: the span over which they were smoothed."""
 AFTER_START_S = 0.15
-INERTIA, SPEED_LAG = Column("p", AT["inertia"]), Column("p", AT["speed_lag"])
+SPEED_LAG = Column("p", AT["speed_lag"])
 """Every column of speed may be late: a counting interval, a filter."""
 PARTS = 10
 """Of the run-up: left out one by one they show how far the inertia depends on each (jackknife: what is left is no white noise)."""

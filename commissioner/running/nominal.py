@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import (
-    Column,
+    INERTIA,
     Fit,
     Machine,
     Problem,
@@ -232,11 +232,10 @@ def _with_inertia(problem: Problem, machine: Machine, free: Sequence[str], *, kn
     fit = min(held, key=lambda f: f.chi2)
     if part.until != problem.until:
         fit = refine(problem, _carried_on(fit), columns_of(free, problem.record, machine, knots=knots))
-    inertia = Column("p", AT["inertia"])
     wide = replace(
         fit,
-        columns=(*fit.columns, inertia),
-        jacobian=np.concatenate([fit.jacobian, jacobian(problem, fit.machine, (inertia,))]),
+        columns=(*fit.columns, INERTIA),
+        jacobian=np.concatenate([fit.jacobian, jacobian(problem, fit.machine, (INERTIA,))]),
     )
     if wide.std("inertia") > OPEN_INERTIA * fit.machine.value("inertia"):
         return fit

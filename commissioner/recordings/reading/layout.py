@@ -17,7 +17,9 @@ from commissioner.recordings.units import IN_NAME, is_unit, read_unit, unit_in
 
 MAX_PREFACE_LINES = 400
 LONGEST_LINE = 1 << 16
-SEPARATORS = (";", "\t", ",", " ")
+MARKS = (";", "\t", ",")
+"""Between the cells of a table, the surest first."""
+SEPARATORS = (*MARKS, " ")
 MOST_BETWEEN = 4
 """Rows between the names and those next to the numbers: of channels, types, ranges."""
 HEAD_ROWS = 3

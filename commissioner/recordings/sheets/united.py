@@ -12,10 +12,9 @@ from itertools import chain
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.reading.cells import NUMBER, is_number, is_numeric
-from commissioner.recordings.reading.layout import HEAD_ROWS, LONGEST_LINE, head_lines, known, split
+from commissioner.recordings.reading.layout import HEAD_ROWS, LONGEST_LINE, MARKS, head_lines, known, split
 from commissioner.recordings.units import Unit, is_unit, read_unit, unit_in
 
-MARKS = (";", "\t", ",")
 LEAST_UNITED = 2
 """Cells of a row that are a number and its unit: fewer may be a remark."""
 SI = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency": "Hz", "resistance": "ohm", "torque": "Nm", "speed": "rad/s",

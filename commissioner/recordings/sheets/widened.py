@@ -15,7 +15,7 @@ from commissioner.recordings.bounds import MAX_COLUMNS
 from commissioner.recordings.names import key_of, meaning_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import is_number
-from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.reading.layout import MARKS, head_lines, split
 from commissioner.recordings.sheets.listed import QUANTITIES, UNITS, VALUES
 from commissioner.recordings.units import unit_in
 from commissioner.recordings.words import translated
@@ -30,7 +30,6 @@ POINT = frozenset(
     ("point", "row", "sample", "index", "no", "nr", "punkt", "messpunkt", "zeile", "test", "versuch", "prueba", "essai", "prova")
 )  # fmt: skip
 """What the columns are called, as `key_of` their names; the rows' key is a time, or a point's number."""
-MARKS = (";", "\t", ",")
 FEWEST_CELLS, MOST_CELLS = 3, 8
 MOST_NUMBERS = 10
 """Rows of numbers above the names of a long table: more are the numbers of another."""
