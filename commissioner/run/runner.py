@@ -204,6 +204,7 @@ class Runner:
 
     def _write(self, command: ask.WriteParameters) -> tuple[WrittenParameter, ...]:
         assert self._snapshot is not None
+        self._folder.save("snapshot.json", self._snapshot)  # the way back, also where somebody removed it
         try:
             report = self._inverter.write_circuit(command.circuit, command.nameplate, self._snapshot)
         except WriteBackFailed as failed:

@@ -154,12 +154,21 @@ def _smallest_step(seen: Signal, known_a: float) -> float:
 
 
 def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_a: float = 0.0) -> StopReason | None:
-    """Of one window, `(phases, n)` and `(n,)`: a phase that stands still though it should move by `STEPS` at least, or the worst one's
-    rms distance from the axis' pattern."""
+    """Of one window, `(phases, n)` and `(n,)`: a phase that is open, one that stands still though it should move by `STEPS` at least, or the
+    worst one's rms distance from the axis' pattern. A coarse converter shows one and the same number of an open phase, too."""
     cosines = np.array(phase_cosines(axis_deg))[: seen.shape[0]]
     current = seen - zero.offset_a[:, None]
     along = cosines @ current / float(cosines @ cosines)
     size_a, noise_a = _rms(along), SIGMAS * float(np.max(zero.noise_a))
+    rest = np.sqrt(np.mean(np.square(current - np.outer(cosines, along)), axis=1))
+    allowed = MISFIT * size_a + noise_a + step_a
+    is_off = float(np.max(rest)) > allowed
+    without = _open_phase(current, cosines, size_a, QUIET / SIGMAS * noise_a + step_a) if is_off else None
+    if without is not None:
+        return StopReason(
+            f"phase {NAMES[without]} carries no current, what flows goes through the other two: it is open", _rms(current[without]),
+            f"{abs(cosines[without]) * size_a:.3g} A", CABLE, unit="A",
+        )  # fmt: skip
     top_v, moved_v = peak(voltage_v), float(np.ptp(voltage_v))
     moves = min(moved_v, top_v) * size_a * np.abs(cosines) > STEPS * step_a * top_v
     still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & moves
@@ -168,16 +177,8 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
         return _distrusted(
             f"the current sensor of phase {names} stands still", 0.0, "a current that moves with the voltage"
         )
-    rest = np.sqrt(np.mean(np.square(current - np.outer(cosines, along)), axis=1))
-    allowed = MISFIT * size_a + noise_a + step_a
-    if float(np.max(rest)) <= allowed:
+    if not is_off:
         return None
-    without = _open_phase(current, cosines, size_a, QUIET / SIGMAS * noise_a + step_a)
-    if without is not None:
-        return StopReason(
-            f"phase {NAMES[without]} carries no current, what flows goes through the other two: it is open", _rms(current[without]),
-            f"{abs(cosines[without]) * size_a:.3g} A", CABLE, unit="A",
-        )  # fmt: skip
     return _distrusted(
         f"the current sensor of phase {_culprit(current, cosines)} does not follow the test axis",
         float(np.max(rest)), f"at most {allowed:.3g} A beside the axis", TURNING + CHECK,

@@ -15,6 +15,9 @@ STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", 
 
 SERVICE = "service"
 """Who asks where no person did: the service lost its operator's page, is shut down, or is gone."""
+SYSTEM = "system"
+"""Who sends SIGTERM: the computer that is shut down, a container that is stopped, another program."""
+_BY = {SERVICE: "stopped by the service", SYSTEM: "stopped by the operating system"}
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class StopAsked:
     @property
     def what(self) -> str:
         """How the run ended by it."""
-        return "stopped by the service" if self.person == SERVICE else "stopped by the operator"
+        return _BY.get(self.person, "stopped by the operator")
 
     @property
     def remedy(self) -> str:
@@ -89,7 +92,8 @@ class OperatorStop:
             signal.signal(number, handler)
 
     def _signalled(self, number: int, _frame: FrameType | None) -> None:
-        self.ask("", "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
+        by = SYSTEM if number == signal.SIGTERM else ""
+        self.ask(by, "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
         if self._computes_in is not None:
             self._computes_in = None
             raise Abandoned

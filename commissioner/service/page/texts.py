@@ -16,7 +16,7 @@ from starlette.requests import HTTPConnection
 from commissioner.motor.circuit import QUANTILE
 from commissioner.motor.quantities import places
 from commissioner.report.sheet.words import NBSP
-from commissioner.run.stopping.operator_stop import SERVICE
+from commissioner.run.stopping.operator_stop import SERVICE, SYSTEM
 from commissioner.service.access.visitors import LOCAL
 from commissioner.service.problems import Refusal
 
@@ -99,8 +99,9 @@ class Texts:
         return next(((translation, match.groupdict()) for match, translation in found if match is not None), ("", {}))
 
     def person(self, name: str) -> str:
-        """Who did it; whoever sits at this computer without an account is called by what they do, the service by what it is."""
-        return self.gettext(name) if name in (LOCAL, SERVICE) else name
+        """Who did it; whoever sits at this computer without an account is called by what they do, the service and the system by what
+        they are."""
+        return self.gettext(name) if name in (LOCAL, SERVICE, SYSTEM) else name
 
     def why(self, person: str, reason: str) -> str:
         """Why somebody stopped a run: in their own words, the service's in the reader's language."""

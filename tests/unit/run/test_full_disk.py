@@ -134,6 +134,21 @@ def test_a_defect_on_a_full_disk_still_lets_the_drive_go(folder):
 def test_a_run_whose_folder_is_gone_energises_and_writes_nothing_more(tmp_path, goes_by):
     """The files that are open take what is written all the same; the snapshot that would bring the old parameters back is lost."""
     folder, drive = RunFolder.create(tmp_path, "gone"), ScriptedDrive()
+    ended = write_after(lambda: goes_by(folder.path), folder, drive)
+    assert ended.outcome == "faulted"
+    assert ended.error["step"] == "archive" and "unmounted back" in ended.error["remedy"]
+    assert drive.written("commit") == drive.written("staged_stator_resistance") == []
+
+
+def test_a_snapshot_that_somebody_deleted_is_there_again_before_anything_is_written(folder):
+    snapshot, drive = folder.path / "snapshot.json", ScriptedDrive()
+    write_after(lambda: snapshot.unlink(missing_ok=True), folder, drive)
+    assert drive.written("staged_stator_resistance")
+    assert "stator_resistance" in snapshot.read_text("utf-8")
+
+
+def write_after(happening, folder, drive):
+    """How a run ends that writes after something happened to its folder."""
     inverter = Inverter(drive, load_profile("simulated"), partial(commission._announce, folder))
     plate = load_motor("motor_2kw2")
     box = prior(plate)
@@ -143,20 +158,18 @@ def test_a_run_whose_folder_is_gone_energises_and_writes_nothing_more(tmp_path, 
     runner._snapshot = inverter.snapshot()
 
     def course():
-        goes_by(folder.path)
+        happening()
         yield ask.WriteParameters(box.typical, plate)
         return RunEnded("commissioned", "written", 0.0)
 
     ended = runner.perform(course())
     folder.close()
-    assert ended.outcome == "faulted"
-    assert ended.error["step"] == "archive" and "bring the run's folder back" in ended.error["remedy"]
-    assert drive.written("commit") == drive.written("staged_stator_resistance") == []
+    return ended
 
 
 def test_a_disk_that_fills_up_while_writing_back_says_what_the_drive_may_hold(folder):
     runner = Runner(Drive(), folder, bounds=None, watch=None, present=lambda record: None)
-    runner._snapshot = object()
+    runner._snapshot = {}
     with pytest.raises(WriteBackFailed, match="old or its new parameters") as caught:
         runner._write(ask.WriteParameters(None, None))
     assert "restore" in caught.value.remedy

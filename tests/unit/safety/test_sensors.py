@@ -346,7 +346,7 @@ def test_the_drives_word_may_be_a_neighbours_by_five_standard_deviations_of_nois
     assert (watch.judge(a_block(peak_a=0.0)) is None) is passes
 
 
-def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0, leak=0.0):
+def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0, leak=0.0, step_a=1e-9):
     """Currents of a motor whose `phase` is open: the others carry one current, there and back, as their voltages drive it."""
 
     def damage(seen, start):
@@ -354,7 +354,7 @@ def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0, leak=0.0):
         through = (seen[forth] - seen[back]) / 2.0
         out = noise * NOISE[:, start : start + seen.shape[1]]
         out[forth], out[back], out[phase] = out[forth] + through, out[back] - through, out[phase] + leak * through
-        return out
+        return step_a * np.round(out / step_a)
 
     return verdict(axis_deg=axis_deg, peak_a=peak_a, damage=damage, offset=(0.0, 0.0, 0.0))
 
@@ -372,8 +372,8 @@ def test_an_open_phase_is_named_as_one_and_is_no_sensors_fault(phase, axis_deg):
 
 @pytest.mark.parametrize(
     "how",
-    [{"peak_a": 3.0, "noise": 20.0}, {"peak_a": 8.0}, {"peak_a": 8.0, "leak": 0.06}],
-    ids=["noise", "large", "leak"],
+    [{"peak_a": 3.0, "noise": 20.0}, {"peak_a": 8.0}, {"peak_a": 8.0, "leak": 0.06}, {"step_a": 0.1}],
+    ids=["noise", "large", "leak", "one and the same number of a coarse converter"],
 )
 def test_an_open_phase_is_named_beside_noise_and_a_leak_and_at_any_size(how):
     reason = single_phase(1, 0.0, **how)
