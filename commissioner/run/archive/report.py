@@ -33,12 +33,12 @@ def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> 
 
 def mark_restored(run: RunSummary) -> None:
     """The report says on top that the drive holds its old values again."""
-    _mark(run, "Restored on {}: the drive holds the values it had before this run.")
+    _mark(run, "Restored on {}: the drive took back the values it had before this run.")
 
 
 def mark_written(run: RunSummary) -> None:
     """The report says on top that the drive holds the values that were only accepted when it was made."""
-    _mark(run, "Written on {}: the drive holds the values of this report, read back.")
+    _mark(run, "Written on {}: the drive took the values of this report, read back.")
 
 
 def _mark(run: RunSummary, sentence: str) -> None:
