@@ -6,11 +6,13 @@ import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
@@ -80,12 +82,7 @@ def read_text(path: Path) -> tuple[str, str]:
 
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
-    text = united(unbarred(text), source)
-    beside = joined(text)
-    text = beside or text
-    turned = upright(text)
-    wide = widened(text, source) if turned is None else None
-    text = turned or wide or text
+    text, reshaped = _as_one_table(united(unbarred(text), source), source)
     layout = layout_of(text, source)
     if layout.is_split:
         raise DataRefused(
@@ -104,24 +101,30 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
     notes += factors_said(layout.preface)
     names, units, clock = _start_and_increment(layout, clock_in(said, marks.decimal))
-    if beside is not None:
+    notes += reshaped
+    names, units, points, of_tests = in_rows(names, units, columns)
+    notes += of_tests
+    once = units_said(said, (" ; ".join(row) for row in layout.preface))
+    return RawTable(names, units, points, _pointed(metadata_of(said), marks), clock, once, tuple(notes))
+
+
+def _as_one_table(text: str, source: str) -> tuple[str, list[ReadingNote]]:
+    """The text with a row for each time or point, and what it was made of; as it is where it was so."""
+    notes = []
+    if (beside := joined(text)) is not None:
+        text = beside
         notes.append(
             ReadingNote(
                 "tables", "tables below each other hold other channels at the same times: they were read as one"
             )
         )
-    if turned is not None:
-        notes.append(
-            ReadingNote(
-                "upright", "quantities stand down the rows: each column of numbers was taken as a point of the test"
-            )
-        )
-    if wide is not None:
-        notes.append(ReadingNote("long_table", "a row for each channel and time: each channel was taken as a column"))
-    names, units, points, of_tests = in_rows(names, units, columns)
-    notes += of_tests
-    once = units_said(said, (" ; ".join(row) for row in layout.preface))
-    return RawTable(names, units, points, _pointed(metadata_of(said), marks), clock, once, tuple(notes))
+    if (turned := upright(text)) is not None:
+        said = "quantities stand down the rows: each column of numbers was taken as a point of the test"
+        return turned, [*notes, ReadingNote("upright", said)]
+    if (wide := widened(text, source)) is not None:
+        said = "a row for each channel and time: each channel was taken as a column"
+        return wide, [*notes, ReadingNote("long_table", said)]
+    return text, notes
 
 
 def _pointed(metadata: Mapping[str, str], marks: Marks) -> dict[str, str]:
@@ -147,28 +150,13 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     rows = table.num_rows
     table, notes = without_headers(table.select(range(layout.skip, width)), wrong_rows, layout)
     notes += without_torn_row(wrong_rows, body, width)
-    columns = []
-    filled = np.zeros(table.num_rows, dtype=np.int64)
-    below = np.zeros(table.num_rows, dtype=bool)
     if is_sheet(layout.names):
         for name, column in zip(layout.names, table.columns, strict=True):
             require_one_motor(name, [str(cell) for cell in column.slice(0, MOST_POINTS).to_pylist()], source)
-    for name, column in zip(layout.names, table.columns, strict=True):
-        values, wrong = to_numbers(column, marks, source)
-        filled += np.isfinite(values)
-        is_said = is_title(name) or (meaning_of(name) == "segment" and not np.isfinite(values).any())
-        cells = [str(cell) for cell in column.to_pylist()] if is_said else []
-        said = codes(cells) if is_title(name) else in_runs(cells)
-        columns.append(values if said is None else said)
-        notes += unknown(cells, said) if said is not None and is_title(name) else ()
-        if said is None and meaning_of(name) != "time_s" and any(map(_STATISTIC.fullmatch, wrong)):
-            below |= [_STATISTIC.fullmatch(str(cell).strip()) is not None for cell in column.to_pylist()]
-        if wrong and said is None and np.isfinite(values).any() and meaning_of(name) != "time_s":
-            notes.append(
-                ReadingNote(
-                    "no_number", f"{len(wrong)} cells of {name} are no number, as {wrong[0][:40]!r}: they were left out"
-                )
-            )
+    cells = [_cells(name, column, marks, source) for name, column in zip(layout.names, table.columns, strict=True)]
+    notes += chain.from_iterable(one.notes for one in cells)
+    filled = sum((np.isfinite(one.numbers) for one in cells), np.zeros(table.num_rows, dtype=np.int64))
+    below = np.any([one.is_statistic for one in cells], axis=0)
     if below.any() and not np.any((filled > 0) & ~below & (np.cumsum(below) > 0)):
         filled[below] = 0
         notes.append(ReadingNote("footer", f"{int(below.sum())} rows of statistics below the values were left out"))
@@ -178,7 +166,40 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     last = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
     if table.num_rows - last > MOST_FOOTER_ROWS:
         last = table.num_rows
-    return [c[:last] for c in columns], notes
+    return [one.values[:last] for one in cells], notes
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """A column's numbers, NaN where a cell is none; its values, which count the names that cells of a test or a segment are; and in which
+    rows it names a statistic of the rows above."""
+
+    numbers: Signal
+    values: Signal
+    is_statistic: NDArray[np.bool_]
+    notes: tuple[ReadingNote, ...]
+
+
+def _cells(name: str, column: pa.ChunkedArray, marks: Marks, source: str) -> _Cells:
+    numbers, wrong = to_numbers(column, marks, source)
+    nowhere, is_empty = np.zeros(len(numbers), dtype=bool), not np.isfinite(numbers).any()
+    if is_title(name):
+        texts = [str(cell) for cell in column.to_pylist()]
+        if (said := codes(texts)) is not None:
+            return _Cells(numbers, said, nowhere, tuple(unknown(texts, said)))
+    elif (
+        meaning_of(name) == "segment"
+        and is_empty
+        and (said := in_runs([str(c) for c in column.to_pylist()])) is not None
+    ):
+        return _Cells(numbers, said, nowhere, ())
+    if meaning_of(name) == "time_s" or not wrong:
+        return _Cells(numbers, numbers, nowhere, ())
+    is_statistic = nowhere
+    if any(map(_STATISTIC.fullmatch, wrong)):
+        is_statistic = np.array([_STATISTIC.fullmatch(str(cell).strip()) is not None for cell in column.to_pylist()])
+    left_out = f"{len(wrong)} cells of {name} are no number, as {wrong[0][:40]!r}: they were left out"
+    return _Cells(numbers, numbers, is_statistic, () if is_empty else (ReadingNote("no_number", left_out),))
 
 
 def _even(body: str, layout: Layout) -> str:
