@@ -1,11 +1,12 @@
 """The catalogue of running machines: complete, consistent, and every size is what the simulator means by it."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from commissioner.estimation.numbers import AT, NAMES, Scales
-from commissioner.running.causes import CATALOGUE, always_tied, confounders_of
+from commissioner.running.causes import CATALOGUE, always_tied, confounders_of, tied_in
 from sim.motoring.effects import CATALOGUE as HIDDEN
 
 SCALES = Scales(10.0, 326.0, 314.0, 25.0, 2)
@@ -34,6 +35,21 @@ def test_confounders_are_known_both_ways_and_exist():
             assert c.name in CATALOGUE
             assert name in confounders_of(c.name)
     assert always_tied("sampling_delay") == ("sensor_lag",)
+
+
+def test_a_current_of_negative_sequence_has_one_class_as_long_as_no_start_parts_it():
+    steady, stepped, started = (
+        SimpleNamespace(has_start=s, is_steady=one) for s, one in ((False, True), (False, False), (True, False))
+    )
+    for name, in_steady, in_steps in (
+        ("voltage_gain_mismatch", {"stator_asymmetry", "line_resistance"}, {"stator_asymmetry"}),
+        ("stator_asymmetry", {"voltage_gain_mismatch", "line_resistance"}, {"voltage_gain_mismatch"}),
+        ("line_resistance", {"voltage_gain_mismatch", "stator_asymmetry"}, set()),
+        ("sampling_delay", {"sensor_lag"}, {"sensor_lag"}),
+    ):
+        assert set(tied_in(name, steady)) == in_steady
+        assert set(tied_in(name, stepped)) == in_steps
+        assert tied_in(name, started) == always_tied(name)
 
 
 def test_every_hidden_effect_of_the_simulator_has_a_name():

@@ -51,7 +51,7 @@ CAUSE = Cause(
     says="One phase of the stator takes {size} of rated current beside its own, in proportion to the voltage: as shorted turns do",
     meaning="A fault of the motor: shorted turns heat where they are and grow.",
     remedy="Stop the motor soon and measure the winding; do not start it again before.",
-    physics="i += (g u_k + b w psi_sk) n_k: turns of winding k (of a delta: between two lines) shorted by a resistance and a leakage; "
+    physics="i += i_f n_k, (b / g) di_f/dt / w + i_f = g (1 + b^2 / g^2) u_k: turns of winding k (of a delta: between two lines) shorted by a resistance and a leakage; "
     "the winding's own resistance and magnetomotive force see i less that",
     signature="a negative-sequence current in proportion to the voltage that the voltage's own unbalance does not explain",
     source="Tallam, Habetler, Harley, IEEE Trans. Ind. Appl. 38(4), 2002; Patel, Chandorkar (locus of the negative sequence against load); Radecki, "
@@ -64,8 +64,10 @@ CAUSE = Cause(
         Confounder(
             "voltage_gain_mismatch",
             "a start; or exchange two voltage probes and record again: what follows the probe is the probe's",
+            tied_without="a start",
         ),
-        Confounder("line_resistance", "a start, or two loads"),
+        Confounder("line_resistance", "a start, or two loads", tied_without="a second load"),
     ),
+    negative_sequence="adds",
     scenario=_scenario,
 )
