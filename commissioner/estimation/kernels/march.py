@@ -23,7 +23,7 @@ STATES = 11
 """psi_s, psi_R, current of the bars' slow part, heat of stator and rotor, electrical speed and angle, voltage behind a loop's leakage."""
 UNSET = 1e300
 """Of the last state at a window's first sample: what the steady fundamental makes of it."""
-MOST_REACTANCE = 3.0
+MOST_REACTANCE = 10.0
 """Of a loop over its resistance, by which its harmonics are."""
 R_S, R_R, L_SIGMA, L_M = (
     AT["stator_resistance"],

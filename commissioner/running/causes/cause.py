@@ -64,7 +64,7 @@ class Cause:
     scenario: Callable[[Values, Scales], Entry] | None = None
     needs: Callable[[Record], bool] = field(default=lambda _: True)
     is_of_measurement: bool = False
-    allows: Callable[[Values], bool] = field(default=lambda _: True)
+    allows: Callable[[Values, Scales], bool] = field(default=lambda _, __: True)
     common: Callable[[Values], float] = field(default=lambda _: 0.0)
     negative_sequence: Literal["", "adds", "impedes"] = ""
 
@@ -79,7 +79,7 @@ class Cause:
     def is_plausible(self, values: Values, scales: Scales) -> bool:
         """Whether the first size lies in the range physics allows."""
         size = self.size(values, scales)
-        return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values))
+        return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values, scales))
 
 
 def in_phases(re: float, im: float) -> tuple[float, float, float]:
