@@ -46,7 +46,7 @@ def tied_in(name: str, record: Record) -> tuple[str, ...]:
 
     Without a start a wrong voltage gain, shorted turns and a resistance in one line are a current of negative sequence alike; a fit that parts them by
     the little that harmonics and noise tell parts them by what its own laws lack. (Four of four turn faults of another simulator under one steady
-    load and mains of 3 % unbalance and 4 % of fifth were a voltage gain, 0.012 of the size its error, 0.99 sure.)
+    load and mains of 1.2 to 3 % unbalance, two of them without a speed, were a voltage gain, 0.99 sure.)
     """
     lacking = {"a start": not record.has_start, "a second load": record.is_steady}
     return _alike(name, lambda c: c.is_always_tied or lacking.get(c.tied_without, False))

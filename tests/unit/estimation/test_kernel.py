@@ -243,7 +243,7 @@ def test_what_shorted_turns_take_makes_no_drop_in_the_winding(iron):
 
 @pytest.mark.parametrize(("start", "settled"), [(UNSET, 0), (0.0, 250)])
 def test_a_shorted_loop_is_a_resistance_and_a_leakage_at_every_harmonic(start, settled):
-    """As a conductance and a susceptance it took three times too much of a fifth harmonic: a start of a 2.2 kW motor with 3 % of shorted turns under 3 % of
+    """As a conductance and a susceptance it took 2.5 times too much of a fifth harmonic: a start of a 2.2 kW motor with 3 % of shorted turns under 3 % of
     fifth and 5 % of seventh had a delay of 27.00 +- 0.29 us beside the right name."""
     g, b, count, w = 0.03, 0.024, 500, SCALES.frequency_rad_per_s
     first = np.zeros(STATES)
