@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
-from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import STATES, UNSET, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES
 from commissioner.estimation.record import STATES as RECORD_STATES
@@ -125,6 +125,7 @@ def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0
     first = np.zeros((len(record.windows), STATES))
     for k, w in enumerate(record.windows):
         if not w.is_from_rest:
+            first[k, 10] = UNSET
             first[k, 0:4] = [w.voltage[0, 1], -w.voltage[0, 0]] * 2 / np.array(record.scales.frequency_rad_per_s)
             before = record.windows[max(k - 1, 0)]  # the shaft still turns with its field
             first[k, 8] = before.direction * (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s

@@ -286,6 +286,13 @@ def _turns_backwards(voltage: Array) -> bool:
     return bool(np.nansum(_swept(voltage)) < 0)
 
 
+def negative_sequence(voltage: Array) -> float:
+    """Size of a voltage's negative sequence, V, whatever the supply's frequency does: z^2 / |z| rests at 1.5 of it (to first order)."""
+    z = voltage[:, 0] + 1j * voltage[:, 1]
+    size = np.abs(z)
+    return float(np.abs(np.mean(z[size > 0.0] ** 2 / size[size > 0.0])) / 1.5)
+
+
 def _turns_against(speed: Array, voltage: Array) -> bool:
     """Whether the shaft turns mostly in the direction opposite to the supply's, as a sensor of the other sign shows it."""
     return bool(np.nansum(_swept(voltage) * speed[1:]) < 0)

@@ -9,14 +9,14 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.cancelling import TimeOver
-from commissioner.estimation.fit import Fit, problem_of
+from commissioner.estimation.fit import Fit, problem_of, simulate
 from commissioner.estimation.numbers import AT, FOUR, NAMES
-from commissioner.estimation.record import Record, prepare
+from commissioner.estimation.record import Record, negative_sequence, prepare
 from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DiagnosisVerdict, RunningRecording
 from commissioner.running.at_flux import at_flux, is_saturated, stator_flux_wb
-from commissioner.running.causes import CATALOGUE, always_tied
+from commissioner.running.causes import CATALOGUE, tied_in
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.lack import Lack, lack_of_fit, not_told, rms_errors
 from commissioner.running.rules import RULES
@@ -185,7 +185,8 @@ def _cause(found: Found, one: Named) -> NamedCause:
     gain, rivals = found.gain[one.cause], found.rivals[one.cause]
     close = max(RULES.tie * found.fit.scale, RULES.tie_share * gain)
     tied = [name for name, lost in rivals.items() if lost < close]
-    equivalent = tuple(dict.fromkeys((*always_tied(one.cause), *tied)))
+    known = (*tied_in(one.cause, found.problem.record), *_of_own_unbalance(found, one))
+    equivalent = tuple(dict.fromkeys((*known, *tied)))
     nearest = min((lost for name, lost in rivals.items() if name not in equivalent), default=gain)
     sure = MOST_SURE * (1.0 - np.exp(-0.5 * min(nearest, gain) / (found.fit.scale * 5.0)))
     total = max(found.nominal.chi2 - found.fit.chi2, 1e-9)
@@ -193,6 +194,22 @@ def _cause(found: Found, one: Named) -> NamedCause:
         one.cause, one.form.name, _sizes(found, one), float(min(gain / total, 1.0)), gain, float(np.sqrt(gain / found.fit.count)),
         float(sure), equivalent, rivals,
     )  # fmt: skip
+
+
+def _of_own_unbalance(found: Found, one: Named) -> tuple[str, ...]:
+    """Whoever makes the impedance at negative sequence another than at slip, where a cause of that sequence is small beside the mains' own."""
+    record, machine = found.problem.record, found.fit.machine
+    if record.has_start or CATALOGUE[one.cause].negative_sequence != "adds":
+        return ()
+    without = machine.with_values(dict.fromkeys(one.form.numbers, 0.0))
+    runs = zip(*(simulate(found.problem, m) for m in (machine, without)), strict=True)
+    made = np.concatenate([(a[0] - b[0])[:, :2] for a, b in runs])
+    volts = max(negative_sequence(w.voltage[::2]) for w in record.windows)
+    driven = volts / (record.scales.frequency_rad_per_s * machine.value("leakage_inductance"))
+    if np.sqrt(2.0 * np.mean(made**2)) >= RULES.own_unbalance * driven:
+        return ()
+    accepted = {c.cause for c in found.accepted}
+    return tuple(c.name for c in CATALOGUE.values() if c.negative_sequence == "impedes" and c.name not in accepted)
 
 
 def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:

@@ -55,6 +55,7 @@ class Step:
 
 WORSE = "what was held out gets worse"
 BEYOND = "its size is one that physics does not allow"
+OF_NOISE = "noise of the voltage alone may make all of it"
 
 
 @dataclass(frozen=True)
@@ -236,19 +237,32 @@ def _weighted(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[F
 def _shown(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, Fit, tuple[Named, ...]]:
     """The fit less what the noise of the input does to it, with the fit and the causes that it stands for.
 
-    A cause whose whole size that noise makes (nothing, or less, is left) is none. Where only a limit of another kind is passed nothing
-    is taken off: what is shown has sizes that physics allows.
+    A cause whose whole size that noise makes (nothing, or less, is left; or less than it may make) is none. Where only a limit of another
+    kind is passed nothing is taken off: what is shown has sizes that physics allows.
     """
     shown = unbiased(seeking.problem, fit)
     beyond = seeking.beyond(shown, accepted)
     values, scales = shown.machine.values(), seeking.problem.record.scales
-    for one in (c for c in beyond if CATALOGUE[c.cause].is_less_than_nothing(values, scales)):
+    nothing = [c for c in beyond if CATALOGUE[c.cause].is_less_than_nothing(values, scales)]
+    for one in (*nothing, *(c for c in accepted if c not in nothing and _is_lost(shown, c))):
         others = tuple(c for c in accepted if c != one)
         less = _less(seeking, fit, accepted, accepted.index(one))
         if seeking.is_plausible(less, others):
-            seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale, BEYOND))
+            why = BEYOND if one in nothing else OF_NOISE
+            seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale, why))
             return _shown(seeking, refreshed(seeking.problem, less), others)
     return (fit if beyond else shown), fit, accepted
+
+
+def _is_lost(shown: Fit, one: Named) -> bool:
+    """Whether a cause that the currents tell is within one standard deviation of nothing, once the noise of the input is counted."""
+    at = [shown.place(name) for name in one.form.numbers]
+    values = np.array([shown.machine.value(name) for name in one.form.numbers])
+    counted, bare = (
+        float(values @ np.linalg.pinv(spread[np.ix_(at, at)]) @ values)
+        for spread in (shown.covariance(), shown.influence() * shown.scale)
+    )
+    return counted < RULES.least_told and bare > RULES.least_gain
 
 
 def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[float, Named, Array]]:

@@ -19,8 +19,12 @@ FAST = {"reassoc", "arcp", "contract", "nsz"}
 _kernel = njit(error_model="numpy", fastmath=FAST, nogil=True)
 _inlined = njit(inline="always", error_model="numpy", fastmath=FAST)
 
-STATES = 10
-"""psi_s, psi_R, current of the bars' slow part, heat of stator and rotor, electrical speed and angle."""
+STATES = 11
+"""psi_s, psi_R, current of the bars' slow part, heat of stator and rotor, electrical speed and angle, voltage behind a loop's leakage."""
+UNSET = 1e300
+"""Of the last state at a window's first sample: what the steady fundamental makes of it."""
+MOST_REACTANCE = 10.0
+"""Of a loop over its resistance, by which its harmonics are."""
 R_S, R_R, L_SIGMA, L_M = (
     AT["stator_resistance"],
     AT["rotor_resistance"],
@@ -80,6 +84,19 @@ def _gap_current(p, both, z0):
         grown = z * (p[SAT_G] + z * (p[SAT_G + 1] + z * p[SAT_G + 2]))
         share -= (share * (1.0 + back * grown) - 1.0) / (1.0 + back * (grown + 2.0 * steep))
     return share * grown
+
+
+@_inlined
+def _reactance(g, b, least):
+    """Of a shorted loop over its resistance, at rated frequency; zero where it has none. `least`: what a step can follow."""
+    x = g * 0.0
+    if g.real > 0.0 and b.real > 0.0:
+        x = b / g
+        if x.real < least:
+            x = g * 0.0 + least
+        if x.real > MOST_REACTANCE:
+            x = g * 0.0 + MOST_REACTANCE
+    return x
 
 
 @_kernel
@@ -182,11 +199,22 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
             # take for them (Tallam, Habetler, Harley, IEEE Trans. Ind. Appl. 38(4), 2002)
             shorted_a, shorted_b = one, one
             if has_loop:
+                k[stage, 10] = one
                 for j in range(len(LOOP_A)):
                     ca, cb = LOOP_A[j], LOOP_B[j]
-                    one_loop = p[LOOP + 2 * j] * (ua * ca + ub * cb) + p[LOOP + 2 * j + 1] * w_n * (
-                        y[0] * ca + y[1] * cb
-                    )
+                    g, b, along = p[LOOP + 2 * j], p[LOOP + 2 * j + 1], ua * ca + ub * cb
+                    linked = w_n * (y[0] * ca + y[1] * cb)
+                    x_loop = _reactance(g, b, w_n * h)
+                    if x_loop.real > 0.0:
+                        # a resistance and a leakage, not a conductance and a susceptance: of the mains' harmonics they take less
+                        if y[10].real >= UNSET:
+                            y[10] = (along + x_loop * linked) / (1.0 + x_loop * x_loop)
+                            x[10] = y[10]
+                        behind = (1.0 + x_loop * x_loop) * y[10]
+                        one_loop = g * along + b / x_loop * (behind - along)
+                        k[stage, 10] = w_n / x_loop * (along - y[10])
+                    else:
+                        one_loop = g * along + b * linked
                     shorted_a, shorted_b = (
                         shorted_a + loop_scale * one_loop * ca,
                         shorted_b + loop_scale * one_loop * cb,
@@ -233,6 +261,8 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 k[stage, 6], k[stage, 7] = hot * (ia * ia + ib * ib), hot * (ra * ra + rb * rb)
             else:
                 k[stage, 6], k[stage, 7] = one, one
+            if not has_loop:
+                k[stage, 10] = one
             if is_free:
                 torque = 1.5 * pairs * (y[3] * ra - y[2] * rb)
                 share = w / w_n

@@ -107,15 +107,27 @@ def meaning(document: Document) -> list[str]:
             f"Seen: {error.get('value')}; expected: {error.get('limit')}; step: {error.get('step')}.",
         ]
     out = [said(str(document["reason"]))] if document["verdict"] in ("unexplained", "not_distinguishable") else []
-    return out + [f"{spoken(c['name']).capitalize()}: {CATALOGUE[c['name']].meaning}" for c in document["causes"]]
+    return out + [f"{who.capitalize()}: {CATALOGUE[name].meaning}" for name, who in _members(document)]
+
+
+def _members(document: Document) -> list[tuple[str, str]]:
+    """Every name of every cause, with how it is spoken of: of a class, `if it is` one of them."""
+    return [
+        (name, f"if it is {spoken(name)}" if c["equivalent"] else spoken(name))
+        for c in document["causes"]
+        for name in (c["name"], *c["equivalent"])
+    ]
 
 
 def actions(document: Document) -> list[tuple[str, str]]:
     """Who does what: of every cause its remedy, then the next recording."""
     rows = [
-        ("for the measurement" if CATALOGUE[c["name"]].is_of_measurement else "for the motor and drive", CATALOGUE[c["name"]].remedy)
-        for c in document["causes"]
-    ]  # fmt: skip
+        (
+            "for the measurement" if CATALOGUE[name].is_of_measurement else "for the motor and drive",
+            f"{who.capitalize()}: {CATALOGUE[name].remedy}" if who.startswith("if") else CATALOGUE[name].remedy,
+        )
+        for name, who in _members(document)
+    ]
     plan = document["next_experiment"]
     return [
         *rows,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -31,11 +32,12 @@ class Form:
 
 @dataclass(frozen=True)
 class Confounder:
-    """Who looks alike, and what a plant can record to tell them apart."""
+    """Who looks alike, and what a plant can record to tell them apart. `tied_without`: what a recording must have before the fit may part them."""
 
     name: str
     told_apart_by: str = ""
     is_always_tied: bool = False
+    tied_without: Literal["", "a start", "a second load"] = ""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Cause:
 
     `allows`: what else physics demands of its numbers. `common`: what share of themselves all resistances and inductances are off by
     if one channel alone is wrong, for which one the data do not tell. `scenario`: entry of [effects] in the simulator; derivatives are those of
-    the kernel's lines, exact by complex step.
+    the kernel's lines, exact by complex step. `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
     """
 
     name: str
@@ -62,8 +64,9 @@ class Cause:
     scenario: Callable[[Values, Scales], Entry] | None = None
     needs: Callable[[Record], bool] = field(default=lambda _: True)
     is_of_measurement: bool = False
-    allows: Callable[[Values], bool] = field(default=lambda _: True)
+    allows: Callable[[Values, Scales], bool] = field(default=lambda _, __: True)
     common: Callable[[Values], float] = field(default=lambda _: 0.0)
+    negative_sequence: Literal["", "adds", "impedes"] = ""
 
     def size(self, values: Values, scales: Scales) -> float:
         """The one that is spoken of."""
@@ -76,7 +79,7 @@ class Cause:
     def is_plausible(self, values: Values, scales: Scales) -> bool:
         """Whether the first size lies in the range physics allows."""
         size = self.size(values, scales)
-        return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values))
+        return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values, scales))
 
 
 def in_phases(re: float, im: float) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import STATES, UNSET, load_tangents, march, tangents
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
 
 SCALES = Scales(11.7, 326.6, 314.16, 26.0, 2)
@@ -239,3 +239,26 @@ def test_what_shorted_turns_take_makes_no_drop_in_the_winding(iron):
         np.stack([volts, np.gradient(volts, PERIOD)], axis=1)[after:-1], (more @ along)[after:-1], rcond=None
     )[0]
     assert taken[0] == pytest.approx(0.03 * SCALES.current_a / SCALES.voltage_v, rel=0.02)
+
+
+@pytest.mark.parametrize(("start", "settled"), [(UNSET, 0), (0.0, 250)])
+def test_a_shorted_loop_is_a_resistance_and_a_leakage_at_every_harmonic(start, settled):
+    """As a conductance and a susceptance it took 2.5 times too much of a fifth harmonic: a start of a 2.2 kW motor with 3 % of shorted turns under 3 % of
+    fifth and 5 % of seventh had a delay of 27.00 +- 0.29 us beside the right name."""
+    g, b, count, w = 0.03, 0.024, 500, SCALES.frequency_rad_per_s
+    first = np.zeros(STATES)
+    first[:4] = [0.0, -1.04, 0.0, -1.04]  # the flux of the voltage
+    first[10] = start
+    loop = {"loop_conductance_u": g, "loop_susceptance_u": b}
+    plain, faulty = (run(numbers(n), count, is_free=False, start=first)[0] for n in ({}, loop))
+    t, x = PERIOD * np.arange(count), b / g
+    told = sum(
+        326.6 * size * np.real(g * (1 + x * x) / (1 + 1j * order * x) * np.exp(1j * order * w * t))
+        for order, size in ((1, 1.0), (5, 0.01))
+    )
+    taken = (faulty - plain) * SCALES.voltage_v / SCALES.current_a
+    late = slice(settled, None)
+    assert np.abs(taken[late, 1]).max() < 1e-9
+    assert np.abs(taken[late, 0] - told[late]).max() < (0.02 if settled else 0.2)
+    assert np.abs(taken[250:, 0] - told[250:]).max() < 0.02
+    assert 326.6 * 0.01 * g * (1 - (1 + x * x) / abs(1 + 5j * x)) > 0.04  # which a conductance is off by

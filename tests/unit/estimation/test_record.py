@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.record import MONITORED_RATE, MONITORED_S, OPENING_S, STATES, between, noise_of, prepare
+from commissioner.estimation.record import (
+    MONITORED_RATE,
+    MONITORED_S,
+    OPENING_S,
+    STATES,
+    between,
+    negative_sequence,
+    noise_of,
+    prepare,
+)
 from commissioner.monitor.intake import clock
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -196,3 +205,10 @@ def test_a_gap_of_the_encoder_ends_a_stretch(start):
     assert all(np.isfinite(w.speed).all() for w in record.windows) and np.isfinite(record.sigma_w)
     assert "300 samples have no speed" in record.remarks[-1]
     assert not prepare([replace(recording, speed_rad_per_s=np.full(speed.size, np.nan))], plate).has_speed
+
+
+def test_the_mains_unbalance_is_read_off_while_their_frequency_drifts_and_their_harmonics_stand():
+    t = 2e-4 * np.arange(8000)
+    angle = 314.16 * t + 0.4 * np.sin(2.0 * t)
+    z = 326.6 * (np.exp(1j * angle) + 0.02 * np.exp(-1j * (angle + 1.0)) + 0.04 * np.exp(-1j * (5.0 * angle + 2.0)))
+    assert negative_sequence(np.stack([z.real, z.imag], axis=1)) == pytest.approx(0.02 * 326.6, rel=0.05)

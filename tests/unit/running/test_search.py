@@ -13,7 +13,7 @@ from commissioner.running import search as module
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.contract import as_document
 from commissioner.running.diagnosis import diagnose
-from commissioner.running.search import BEYOND, Named, Search, so_far
+from commissioner.running.search import BEYOND, OF_NOISE, Named, Search, so_far
 from tests.running_effects.start import FOUR, PLATE, started
 
 IRON = Named("iron_loss", CATALOGUE["iron_loss"].forms[0])
@@ -27,10 +27,10 @@ def problem():
 
 
 def fit_of(problem, chi2, **numbers):
-    """A fit that ended at these numbers, with so much chi-square; its sensitivities are nobody's."""
+    """A fit that ended at these numbers, each sure to 1e-4, with so much chi-square."""
     machine = plain_machine(list(FOUR.values()), problem.record).with_values(numbers)
     columns = tuple(Column("p", AT[n]) for n in numbers)
-    return Fit(machine, columns, chi2, np.zeros(1000), np.eye(len(columns), 1000), 0.0, 0)
+    return Fit(machine, columns, chi2, np.zeros(1000), 1e4 * np.eye(len(columns), 1000), 0.0, 0)
 
 
 def searching(problem, monkeypatch, *, ends=None):
@@ -118,3 +118,15 @@ def test_a_diagnosis_is_given_up_within_its_first_fit(times):
     assert document["reason"].startswith("Not finished") and document["next_experiment"] is None
     assert any("diagnose the recording again without a limit" in r for r in document["remarks"])
     assert page_of(seen, document, "start.csv").headline.startswith("Not finished")
+
+
+@pytest.mark.parametrize(("size", "stays"), [(0.5e-2, ()), (2e-2, (IRON,))])
+def test_a_cause_within_one_standard_deviation_of_nothing_is_no_name(problem, monkeypatch, size, stays):
+    """A healthy motor behind a filtered inverter had a delay of -17 +- 480 us, 0.99 sure: 480 was what the carrier in the voltage makes."""
+    fit = fit_of(problem, 1000.0, iron_conductance=size)
+    seeking = searching(problem, monkeypatch)
+    aside = np.array([[1e-2]])
+    monkeypatch.setattr(module, "unbiased", lambda _, one: replace(one, aside=aside))
+    _, _, accepted = module._shown(seeking, fit, (IRON,))
+    assert accepted == stays
+    assert [s.why for s in seeking.steps] == ([] if stays else [OF_NOISE])

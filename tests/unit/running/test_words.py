@@ -1,6 +1,6 @@
 """What a technician reads of a running diagnosis."""
 
-from commissioner.report.running.words import headline, quantity, said, sentence
+from commissioner.report.running.words import actions, headline, meaning, quantity, said, sentence
 
 CAUSE = {
     "name": "stator_asymmetry", "equivalent": [], "form": "phase v", "confidence": 0.99, "gain_share": 1.0,
@@ -52,3 +52,16 @@ def test_no_key_of_a_cause_and_no_digit_beyond_the_interval_is_shown():
         "These data cannot tell apart: sampling delay or sensor lag."
     )
     assert quantity({"value": 4.7912, "std": 0.66, "unit": "us"}) == "4.8 ± 1.3 µs"
+
+
+def test_what_one_of_a_class_asks_for_is_said_of_that_one_only():
+    """ "Stop the motor soon" stood above a healthy motor, of which shorted turns and a second cage could not be told apart."""
+    tied = {"name": "stator_asymmetry", "equivalent": ["rotor_skin_effect"]}
+    document = {"verdict": "not_distinguishable", "reason": "", "causes": [tied], "next_experiment": None}
+    assert [text.split(":")[0] for _, text in actions(document)] == [
+        "If it is stator asymmetry",
+        "If it is rotor skin effect",
+    ]
+    assert meaning(document)[2].startswith("If it is rotor skin effect: ")
+    alone = {**document, "verdict": "explained", "causes": [{**tied, "equivalent": []}]}
+    assert actions(alone)[0][1].startswith("Stop the motor")

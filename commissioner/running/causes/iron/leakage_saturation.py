@@ -35,7 +35,7 @@ CAUSE = Cause(
     ),
     sizes=_sizes,
     range=(0.0, 0.8),
-    allows=lambda v: v["leakage_softness"] == v["rotor_leakage_softness"] == 0.0 or v["leakage_knee"] >= LEAST_KNEE,
+    allows=lambda v, _: v["leakage_softness"] == v["rotor_leakage_softness"] == 0.0 or v["leakage_knee"] >= LEAST_KNEE,
     confounders=(Confounder("speed_sensor_lag", "a start and load steps"), Confounder("rotor_skin_effect", "a start")),
     scenario=lambda v, s: {"size": _sizes(v, s)["lost_at_six_times_rated"][0]},
 )

@@ -32,5 +32,6 @@ CAUSE = Cause(
         Confounder("stator_asymmetry", "a start"),
         Confounder("iron_loss", "a start from the mains with the speed recorded"),
     ),
+    negative_sequence="impedes",
     scenario=lambda v, _: {"size": v["bar_resistance"]},
 )

@@ -28,6 +28,7 @@ CAUSE = Cause(
     forms=(Form("", ("voltage_gain_re", "voltage_gain_im")),),
     sizes=_sizes,
     range=(-0.6, 0.6),
+    negative_sequence="adds",
     scenario=lambda v, s: {"size": _apart(v)[1], "phase": _apart(v)[0]},
     is_of_measurement=True,
     common=lambda v: abs(_apart(v)[1]) / 3.0,

@@ -29,6 +29,7 @@ CAUSE = Cause(
     forms=(Form("", ("line_re", "line_im")),),
     sizes=_sizes,
     range=(-100.0, 1e4),
-    confounders=(Confounder("voltage_gain_mismatch", "a start; or two loads"),),
+    confounders=(Confounder("voltage_gain_mismatch", "a start; or two loads", tied_without="a second load"),),
+    negative_sequence="adds",
     scenario=_scenario,
 )
