@@ -225,13 +225,14 @@ def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], l
     if segment.size != time.size:
         return dict(columns), []
     is_shared = bool(np.any((np.diff(time) == 0.0) & (np.diff(segment) == 0.0)))
-    printed = np.full(time.size, _printing_step(time)) if is_shared else printed_step(time)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(segment) != 0.0) + 1, [time.size]])
     parts = [slice(int(a), int(b)) for a, b in pairwise(edges)]
     period = _period([time[p] for p in parts])
-    if period is None or not (
-        is_shared or _is_rounded(np.diff(time)[np.diff(segment) == 0.0], float(printed.max()), period)
-    ):
+    if period is None:
+        return dict(columns), []
+    steps = np.diff(time)[np.diff(segment) == 0.0]
+    printed = np.full(time.size, _printing_step(time)) if is_shared else _rounded_to(time, steps, period)
+    if printed is None:
         return dict(columns), []
     mended = np.empty_like(time)
     for part in parts:
@@ -247,10 +248,13 @@ def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], l
     return {**columns, "time_s": mended}, [note]
 
 
-def _is_rounded(steps: Signal, printed_s: float, period_s: float) -> bool:
-    """Whether steps are uneven by more than is let pass, and no more than stamps of this printing step make them."""
-    uneven_s = np.max(np.abs(steps - period_s), initial=0.0)
-    return bool(ROUNDED * period_s < uneven_s <= printed_s + 1e-12 < period_s)
+def _rounded_to(time: Signal, steps: Signal, period_s: float) -> Signal | None:
+    """The last digit's worth of every stamp, where it explains steps that are uneven by more than is let pass; else None."""
+    uneven_s = float(np.max(np.abs(steps - period_s), initial=0.0))
+    if not ROUNDED * period_s < uneven_s < period_s or period_s < LEAST_STEP_S:
+        return None
+    printed = printed_step(time)
+    return printed if uneven_s <= printed.max() + 1e-12 < period_s else None
 
 
 def _period(parts: list[Signal]) -> float | None:
