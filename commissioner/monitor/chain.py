@@ -11,6 +11,7 @@ from commissioner.monitor.intake.against_plate import (
     doubt_of,
     of_contradiction,
     over_currents,
+    unresolved_shaft,
     unscaled_order_deg,
     volts_per_hertz,
 )
@@ -146,6 +147,9 @@ def observe(
     against, said = against_plate(audited, shaft_hz, plate), doubt_of(audited, shaft_hz, plate)
     if said is not None:
         audited = replace(audited, findings=(*audited.findings, said))
+    blurred = None if against is None else unresolved_shaft(audited, shaft_hz, float(np.ptp(frame.time_s[part])), plate)
+    if blurred is not None:
+        return Refused(audited, blurred, (*audited.findings, blurred))
     if against is not None:
         other = unscaled_order_deg(audited, shaft_hz, plate)
         if lag_deg is None and other is not None:

@@ -54,6 +54,10 @@ def is_negative_sum(u: Signal, v: Signal, w: Signal) -> bool:
     return bool(np.all(np.abs(parts[0] + parts[1] + parts[2]) <= 1.02 * step))
 
 
+LEAST_VALUE = 1e-280
+"""Below it a value (of damaged bits) has no digits that a power of ten could raise to a whole number."""
+
+
 def printed_step(x: Signal) -> Signal:
     """The last digit's worth of every value: of a fixed number of decimals or of significant digits, whichever is coarser.
 
@@ -66,7 +70,7 @@ def printed_step(x: Signal) -> Signal:
         4.0 * float(np.finfo(np.float32 if is_single else np.float64).eps) * np.maximum(np.abs(x), np.max(np.abs(x)))
     )
     decade = np.floor(np.log10(np.maximum(np.abs(x), 1e-300)) + 1e-9)
-    own = np.floor(np.log10(np.abs(sample)) + 1e-9)
+    own = np.floor(np.log10(np.maximum(np.abs(sample), LEAST_VALUE)) + 1e-9)
     decimals = next((d for d in range(-3, MOST_DIGITS) if _is_whole(sample * 10.0**d)), MOST_DIGITS)
     digits = next((n for n in range(1, MOST_DIGITS) if _is_whole(sample * 10.0 ** (n - 1 - own))), MOST_DIGITS)
     printed = np.maximum(10.0**-decimals, 10.0 ** (decade + 1 - digits))

@@ -105,16 +105,20 @@ def sure_mismatch(machine: InverseGamma, resistance_std_ohm: float, plate: Namep
 
 
 def inductance_mismatch(inductance_h: float, std_h: float, plate: Nameplate) -> PlateMismatch | None:
-    """Of the static stator inductance alone, which a first small current tells."""
+    """Of the static stator inductance alone, which a first small current tells.
+
+    A star for delta is said where its range holds the value less SURE standard errors: a 22 kW motor's, 4.4 times the plate's, was seen
+    as 6.3 +- 1.6 times, beyond the range's end at 5.9, and nothing was said of the wiring.
+    """
     typical = prior(plate).typical
     typical_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
     if inductance_h - SURE * std_h <= MOST_INDUCTIVE * typical_h:
         return None
-    ratio = inductance_h / typical_h
-    is_delta = plate.connection == "delta"
+    ratio, least = inductance_h / typical_h, (inductance_h - SURE * std_h) / typical_h
+    is_star = plate.connection == "delta" and least <= OTHER_CONNECTION * MOST_INDUCTIVE
     return _of_scale(
         "the inductance is not that of the plate's motor", ratio, f"at most {MOST_INDUCTIVE:g} of the plate's typical",
-        ratio, plate, ratio if is_delta and ratio <= OTHER_CONNECTION * MOST_INDUCTIVE else None,
+        ratio, plate, ratio if is_star else None,
     )  # fmt: skip
 
 

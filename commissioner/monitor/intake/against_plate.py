@@ -12,6 +12,11 @@ from commissioner.motor.plate_match import Contradiction, OperatingPoint, contra
 from commissioner.motor.running import from_nameplate, slip_at_lag
 from commissioner.records import ReadingNote, RunningRecording
 
+RESOLVED = 0.25
+"""Of a period of the recording's length: lines nearer to each other than that pull each other, a start's last transient does as well.
+Without it 110 kW and 200 kW motors at a tenth of their load, 3 s long, were refused as of half the plate's current: their shaft lines, 0.05 ...
+0.2 of a period beside the supply's, were seen by up to 0.15 off."""
+
 VOLTS_PER_HERTZ = (0.1, 4.0)
 """Of the plate's: motors at no load are run at a third, starts at a few hertz at twice."""
 
@@ -24,6 +29,24 @@ def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) ->
     """
     point = _point(audited, shaft_hz, plate)
     return None if point is None else contradiction(point, plate)
+
+
+def unresolved_shaft(audited: Audited, shaft_hz: float | None, length_s: float, plate: Nameplate) -> Finding | None:
+    """Of a contradiction that rests on the slip alone: where the slip of the power factor, which a common factor of the currents leaves as it
+    is, makes the plate's motor of them, and the two shaft lines are one within this length, no scale is wrong: the slip is. None elsewhere."""
+    taken, by_lag = _point(audited, shaft_hz, plate), _point(audited, None, plate)
+    if shaft_hz is None or taken is None or by_lag is None or contradiction(by_lag, plate) is not None:
+        return None
+    expected_hz = by_lag.frequency_hz * (1.0 - by_lag.slip) / plate.pole_pairs
+    apart = abs(shaft_hz - expected_hz) * length_s
+    if apart > RESOLVED:
+        return None
+    return Finding(
+        "no_shaft_line", "refused",
+        f"the shaft's line, seen at {shaft_hz:.5g} Hz, lies too near the supply's for {length_s:.2f} s: current and power factor are those of the "
+        f"plate's motor at {expected_hz:.5g} Hz",
+        shaft_hz, f"{RESOLVED:g} of a period of the recording's length apart", "record 30-60 s at steady load, or at more load",
+    )  # fmt: skip
 
 
 def unscaled_order_deg(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> float | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
+from commissioner.motor.computed import printed_step
 from commissioner.recordings.names import key_of
 from commissioner.recordings.reading.preface import Clock
 from commissioner.recordings.table import ColumnReading
@@ -29,6 +30,9 @@ LEAST_BACK = 16
 """Rows by which a time must go back to begin again: less is a row out of its place."""
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
+ROUNDED = 0.1
+"""Of a period: stamps rounded more coarsely are a straight line's. Without it 4 kHz printed to 0.1 ms, or to six digits beyond 10 s (what many
+programs print unasked), was refused as of unequal steps."""
 
 
 def with_time(columns: dict[str, Signal], clock: Clock) -> list[ReadingNote]:
@@ -212,31 +216,45 @@ def without_doubled_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signa
 
 
 def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
-    """Stamps that several rows share, where they leave a straight line by no more than their printing step, as that line;
-    each segment by itself, all at one period. Any other time stays as it is."""
+    """Stamps that several rows share, or rounded to a good part of the period, where they leave a straight line by no more than their printing
+    step, as that line; each segment by itself, all at one period. Any other time stays as it is."""
     time = columns.get("time_s")
     if time is None or time.size < LEAST_ROWS or not np.isfinite(time).all():
         return dict(columns), []
     segment = columns.get("segment", np.zeros(time.size))
-    if segment.size != time.size or not np.any((np.diff(time) == 0.0) & (np.diff(segment) == 0.0)):
+    if segment.size != time.size:
         return dict(columns), []
+    is_shared = bool(np.any((np.diff(time) == 0.0) & (np.diff(segment) == 0.0)))
     edges = np.concatenate([[0], np.flatnonzero(np.diff(segment) != 0.0) + 1, [time.size]])
     parts = [slice(int(a), int(b)) for a, b in pairwise(edges)]
     period = _period([time[p] for p in parts])
     if period is None:
         return dict(columns), []
+    steps = np.diff(time)[np.diff(segment) == 0.0]
+    printed = np.full(time.size, _printing_step(time)) if is_shared else _rounded_to(time, steps, period)
+    if printed is None:
+        return dict(columns), []
     mended = np.empty_like(time)
     for part in parts:
         count = np.arange(part.stop - part.start, dtype=np.float64)
         line = period * (count - count.mean()) + time[part].mean()
-        if np.max(np.abs(time[part] - line)) > _printing_step(time[part]) + 1e-12:
+        if np.max(np.abs(time[part] - line)) > printed[part].max() + 1e-12:
             return dict(columns), []
         mended[part] = line
     note = ReadingNote(
         "rounded_time",
-        f"time is printed in steps of {_printing_step(time):.6g} s, several rows share one: the period is the mean step, {period:.6g} s",
+        f"time is printed in steps of {printed.max():.6g} s{', several rows share one' * is_shared}: the period is the mean step, {period:.6g} s",
     )
     return {**columns, "time_s": mended}, [note]
+
+
+def _rounded_to(time: Signal, steps: Signal, period_s: float) -> Signal | None:
+    """The last digit's worth of every stamp, where it explains steps that are uneven by more than is let pass; else None."""
+    uneven_s = float(np.max(np.abs(steps - period_s), initial=0.0))
+    if not ROUNDED * period_s < uneven_s < period_s or period_s < LEAST_STEP_S:
+        return None
+    printed = printed_step(time)
+    return printed if uneven_s <= printed.max() + 1e-12 < period_s else None
 
 
 def _period(parts: list[Signal]) -> float | None:

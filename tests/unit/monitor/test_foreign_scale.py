@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.chain import Refused, observe
-from commissioner.monitor.intake.against_plate import unscaled_order_deg
+from commissioner.monitor.intake.against_plate import RESOLVED, against_plate, unresolved_shaft, unscaled_order_deg
 from commissioner.monitor.intake.channels import THIRD, Pairing, pair
 from commissioner.monitor.intake.findings import Audited, Finding, Fundamental
 from commissioner.motor.plate_match import OperatingPoint, contradiction, plate_point
@@ -123,3 +123,23 @@ def test_power_against_the_slip_is_no_machine_of_the_plate_and_a_generator_is() 
     assert contradiction(generator, PLATE) is None
     idling = plate_point(PLATE, replace(at, slip=-0.01 * PLATE.rated_slip))
     assert contradiction(replace(idling, power_w=0.1 * PLATE.rated_power_w), PLATE) is None
+
+
+def test_a_slip_that_the_length_does_not_resolve_accuses_no_scale() -> None:
+    """110 and 200 kW motors at a tenth of their load were refused as of half the plate's current: 0.15 periods off, in the shaft's line."""
+    _, shaft_hz, named = audited(1.0, 0.1, 0.0)
+    right = audited(1.0, 0.1, named)[0]
+    pulled_hz = shaft_hz - 0.3
+    assert against_plate(right, pulled_hz, PLATE) is not None
+    blurred = unresolved_shaft(right, pulled_hz, 0.9 * RESOLVED / 0.3, PLATE)
+    assert blurred is not None and blurred.code == "no_shaft_line" and f"{shaft_hz:.3f}"[:5] in blurred.what
+    assert unresolved_shaft(right, pulled_hz, 1.1 * RESOLVED / 0.3, PLATE) is None
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+@pytest.mark.parametrize("load", [0.1, 0.7])
+def test_a_foreign_scale_stays_one_however_short_the_recording(scale: float, load: float) -> None:
+    _, shaft_hz, named = audited(scale, load, 0.0)
+    right = audited(scale, load, named)[0]
+    assert against_plate(right, shaft_hz, PLATE) is not None
+    assert unresolved_shaft(right, shaft_hz, 0.01, PLATE) is None

@@ -13,6 +13,7 @@ from commissioner.monitor.chain import Observation, Refused, Wishes
 from commissioner.monitor.intake.channels import THIRD, Pairing, is_straight_motor, pair
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.monitor.loads.pairing_by_start import wired_in
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import (
@@ -210,3 +211,23 @@ def test_the_slip_of_a_power_and_of_a_lag_is_negative_where_it_generates(slip: f
     power = 1.5 * volts**2 * (1 / impedance).real
     assert slip_at_power(CIRCUIT, w, volts, power) == pytest.approx(slip, rel=1e-6)
     assert slip_at_lag(CIRCUIT, w, float(np.angle(impedance))) == pytest.approx(slip, rel=1e-6)
+
+
+LARGE = Nameplate(55e3, 400.0, 50.0, 95.7, 1480.0, 0.87, 2, "delta")
+OF_LARGE = equal_leakages(InverseGamma(0.0348, 0.0305, 1.385e-3, 0.0201))
+
+
+@pytest.mark.parametrize("slip", [1.0, 0.5, 0.25])
+def test_no_sound_start_is_wired_otherwise(slip: float) -> None:
+    """A large motor's start draws more amperes than it has volts: its columns were taken as exchanged, the wiring as crossed, and the steady
+    stretch behind it as generating."""
+    said = set()
+    for plate, circuit in (*MACHINES, (LARGE, OF_LARGE)):
+        t = np.arange(0.0, 0.4, 4e-4)
+        volts = plate.rated_voltage_v * math.sqrt(2 / 3)
+        drawn = volts / stator_impedance(circuit, plate.rated_frequency_rad_per_s, slip)
+        u, v, w = (np.exp(1j * (plate.rated_frequency_rad_per_s * t - THIRD * k)) for k in range(3))
+        currents = np.real(drawn * u), np.real(drawn * v), np.real(drawn * w)
+        voltages = np.real(volts * u), np.real(volts * v), np.real(volts * w)
+        said.add(wired_in(RunningRecording(t, currents, voltages, False, None, 4e-4), plate))
+    assert said == {None, ((0, 1), (1, 1), (2, 1))}

@@ -207,6 +207,15 @@ def test_the_first_inductance_is_bounded_upwards_alone():
     assert "wired" not in inductance_mismatch(3.001 * MOST_INDUCTIVE * typical_h, 0.0, delta).what
 
 
+def test_a_first_inductance_whose_range_reaches_a_star_for_delta_names_it():
+    """A 22 kW motor's first current told 6.3 +- 1.6 times the plate's typical inductance, of 4.4 that it had: the wiring was not named."""
+    typical_h = inductance(prior(PLATE).typical)
+    delta = replace(PLATE, connection="delta")
+    assert "is wired in star" in inductance_mismatch(6.3 * typical_h, 1.6 * typical_h, delta).what
+    assert "wired" not in inductance_mismatch(6.3 * typical_h, 0.1 * typical_h, delta).what
+    assert "wired" not in inductance_mismatch(6.3 * typical_h, 1.6 * typical_h, PLATE).what
+
+
 def test_the_largest_first_inductance_is_still_the_plates():
     """Of plates whose typical inductance times the limit is no rounded number."""
     plates = [plate for _, _, plate in KNOWN]

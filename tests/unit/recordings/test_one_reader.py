@@ -12,6 +12,7 @@ from commissioner.motor.computed import is_negative_sum
 from commissioner.recordings.imported import store, understand
 from commissioner.recordings.importers import contract_table, read_running
 from commissioner.recordings.reading.mapping import read_mapping
+from commissioner.recordings.reading.mend import with_whole_time
 from commissioner.recordings.table import to_standstill
 
 RATE_HZ = 2000.0
@@ -208,6 +209,31 @@ def test_stamps_printed_short_become_the_mean_step_and_it_is_said(tmp_path: Path
     recording = read_running(path)
     assert recording.sample_period_s == pytest.approx(1 / RATE_HZ, rel=1e-4)
     assert [note.code for note in recording.notes] == ["rounded_time"]
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "start_s", "shown"),
+    [(4000.0, 0.0, ".4f"), (4000.0, 9.5, ".6g"), (8000.0, 0.0, ".4f"), (3000.0, 0.0, ".4f"), (12000.0, 98.0, ".6g")],
+)
+def test_stamps_rounded_to_a_part_of_the_period_become_the_mean_step(rate_hz, start_s, shown) -> None:
+    """Six digits are what many programs print unasked: 4 kHz was refused from 10 s on, as of unequal steps, and 0.1 ms from the first."""
+    time = start_s + np.arange(8000) / rate_hz
+    stamps = np.array([float(f"{t:{shown}}") for t in time])
+    columns, notes = with_whole_time({"time_s": stamps})
+    assert [note.code for note in notes] == ["rounded_time"] and "share" not in notes[0].what * (rate_hz <= 8000.0)
+    assert np.ptp(np.diff(columns["time_s"])) < 1e-9 and columns["time_s"] == pytest.approx(time, abs=5e-5)
+    assert np.mean(np.diff(columns["time_s"])) == pytest.approx(1.0 / rate_hz, rel=1e-4)
+
+
+@pytest.mark.parametrize("period_s", [4e-4, 2.5e-4, 1e-3, 2e-3, 1.25e-4, 1e-4 / 3.0])
+def test_even_and_jittered_stamps_stay_as_they_are(period_s) -> None:
+    """What is printed in whole digits is no rounding, and steps uneven by more than the last digit are the clock's."""
+    even = np.array([float(f"{period_s * k:.9g}") for k in range(2000)])
+    jittered = even + np.round(0.4 * period_s * np.random.default_rng(1).random(2000), 8)
+    gap = np.where(np.arange(2000) < 900, even, even + 3.0 * period_s)
+    for time in (even, jittered, gap):
+        columns, notes = with_whole_time({"time_s": time})
+        assert notes == [] and columns["time_s"] is time
 
 
 def test_rows_written_twice_are_taken_once_and_it_is_said(tmp_path: Path) -> None:
