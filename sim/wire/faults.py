@@ -49,9 +49,25 @@ DRIVE = {
     "refuse": "watchdog_ms",
     "other_map": 100,
     "runs_away": None,
+    "loses_voltage": 0.2,
+    "clamps_voltage": 20.0,
+    "clamps_current": 5.0,
 }
+CUTS = {"loses_voltage": "lost_voltage", "clamps_voltage": "most_voltage_v", "clamps_current": "most_current_a"}
+"""What a drive does to its output without saying so (a part, V, A), and the fact of the drive that it is."""
 WRITE_REGISTERS = 16
-NUMBERED = {"late", "truncated", "wrong_unit", "short_reply", "stall", "restart", "overrun", "sample_gap", "other_map"}
+NUMBERED = {
+    "late",
+    "truncated",
+    "wrong_unit",
+    "short_reply",
+    "stall",
+    "restart",
+    "overrun",
+    "sample_gap",
+    "other_map",
+    *CUTS,
+}
 
 
 class FaultError(Exception):
@@ -209,6 +225,9 @@ def _misbehave(fault: Fault, drive: Firmware) -> None:
         drive.setup.runs_away = True
     elif fault.name == "ignore":
         drive.setup.ignores = drive.setup.ignores | {str(fault.argument)}
+    elif fault.name in CUTS:
+        setattr(drive.setup, CUTS[fault.name], float(fault.argument or 0.0))
+        drive.take_cuts()
     elif fault.name == "refuse":
         drive.setup.refuses = drive.setup.refuses | {str(fault.argument)}
 
