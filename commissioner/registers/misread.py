@@ -52,8 +52,9 @@ def _in_order(word: int, order: tuple[int, ...]) -> int:
 
 
 def misread(key: str, value: float, low: float, high: float, unit: str = "") -> str:
-    """What to try in the drive file's item `key`, of which a value within `low` ... `high` is expected; empty where nothing makes it one."""
-    for right, how in _ways(value):
+    """What to try in the drive file's item `key`, of which a value within `low` ... `high` is expected; empty where it is one, and where nothing makes it
+    one."""
+    for right, how in _ways(float(value)) if not low <= value <= high else ():
         if low <= right <= high:
             shown = f"{right:.4g} {unit}".rstrip()
             return f"or see items.{key} in the drive file, which would be {shown} {how}"

@@ -50,6 +50,6 @@ def test_a_float_that_was_read_as_a_whole_number_is_told():
     assert misread("dc_link_v", seen, 480.0, 640.0, "V").endswith('541.2 V as type = "f32"')
 
 
-@pytest.mark.parametrize("value", [300.0, 0.0, float("nan"), float("inf"), 1e300])
+@pytest.mark.parametrize("value", [541, 300, 300.0, 0.0, float("nan"), float("inf"), 1e300])
 def test_a_value_that_no_misreading_explains_gets_no_guess(value):
     assert misread("dc_link_v", value, 480.0, 640.0, "V") == ""
