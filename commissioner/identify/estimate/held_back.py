@@ -25,8 +25,8 @@ SIGMAS = 8.0
 """Of the mean over the peaks: sound tests showed up to 2, a drive that took a tenth off the largest current 10 and more."""
 LEAST_SHARE = 0.01
 """Of the largest voltage of the test: what is missing below it moves no value by what its acceptance allows."""
-NEAREST, FARTHEST = 1, 5
-"""Rows between two measured currents: every one, or one of those whose means a slow link carries."""
+FARTHEST = 8
+"""Rows from one measured current to the next, of the means that a slow link carries: longer ones know no peaks, and say nothing."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,11 @@ class HeldBack:
 
 
 def held_back(segments: Sequence[Segment], batch: BatchFit, machine: InverseGamma) -> HeldBack | None:
-    """The clearer of current and voltage, None where neither lacks anything at its peaks."""
+    """The clearer of current and voltage, None where neither lacks anything at its peaks, or where means are too long to show peaks."""
     seen = [_missing(s, r, machine, batch.sample_period_s) for s, r in zip(segments, batch.residuals, strict=True)]
     missing_v, current_a, voltage_v = (np.concatenate(each) for each in zip(*seen, strict=True))
+    if not missing_v.size:
+        return None
     least_v = LEAST_SHARE * peak(voltage_v)
     found = [
         (sigmas, HeldBack(what, PEAKS * peak(of), unit, volts))
@@ -68,7 +70,7 @@ def _missing(
     that the fit expected, and the voltage that the samples say."""
     rows = np.flatnonzero(segment.weight > 0.0) if segment.weight is not None else np.arange(segment.current_a.size)
     apart = np.diff(rows)
-    near = (apart >= NEAREST) & (apart <= FARTHEST)
+    near = apart <= FARTHEST
     r_s, r_r, leakage_h, _ = machine.as_tuple()
     rise, middle = np.diff(residual_a), 0.5 * (residual_a[1:] + residual_a[:-1])
     gained_v = leakage_h * rise / (apart * period_s) + (r_s + r_r) * middle

@@ -60,3 +60,7 @@ def test_a_voltage_that_is_clamped_is_named_with_what_is_missing():
 def test_a_drive_that_holds_nothing_back_is_not_accused(drive):
     """Also where the leakage saturates: its volts follow the slope of the current."""
     assert seen(**drive) is None
+
+
+def test_means_too_long_to_show_peaks_accuse_nobody():
+    assert seen(every=20, limit_a=0.8 * TOP_A) is None
