@@ -327,7 +327,8 @@ class ModbusPort:
         self._client.comm_params.timeout_connect = self.reply_timeout_s
         self.stats.requests += 1
         start = self._clock()
-        self.stats.longest_gap_s = max(self.stats.longest_gap_s, start - self._answered_s)
+        gap_s = start - self._answered_s
+        self.stats.longest_gap_s = max(self.stats.longest_gap_s, gap_s)
         try:
             reply = send()
         except ModbusException as error:
@@ -340,6 +341,7 @@ class ModbusPort:
         finally:
             self._answered_s = self._clock()
             took_s = self._answered_s - start
+            self.stats.turns_s.append((gap_s, took_s))
             if took_s > HOST_STOPPED * self.reply_timeout_s:
                 self.stats.longest_gap_s = max(self.stats.longest_gap_s, took_s)
         if took_s <= HOST_STOPPED * self.reply_timeout_s:
