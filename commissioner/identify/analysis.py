@@ -321,6 +321,8 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
         if do_legs_drive_beside(r.axis_deg, r.batch)
     ]
     for result in results:
+        if result.held_back is not None:
+            remarks.append(f"axis {result.axis_deg:g} deg: {result.held_back.sentence}")
         if result.turning_rad_per_s:
             remarks.append(
                 f"axis {result.axis_deg:g} deg: the shaft turned, at {result.turning_rad_per_s:.2g} rad/s (electrical) or more; standard errors "

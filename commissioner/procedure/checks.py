@@ -11,6 +11,7 @@ from commissioner.errors import CheckFailed
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.link_plan import LONGEST_REQUEST_S, StreamPace, least_baud, plan_link
 from commissioner.records import DriveIdentity, DriveStatus
+from commissioner.registers.misread import misread
 from commissioner.registers.status import DriveState
 
 NAMEPLATE_TOLERANCE = 0.05
@@ -63,6 +64,11 @@ UNITS_OF_KEYS = ("w", "v", "hz", "a", "rpm", "s", "ms", "wb", "degc", "percent",
 SMALLEST_DRIVE = 0.9
 """Peak rated current of the drive, of the test current: on a smaller drive tests aim lower (`Findings.test_current_a`)."""
 
+FAR_TOO_SMALL = 0.3
+"""Of the test current, the peak current of a drive that nobody puts in front of such a motor: its register is misread."""
+COLDEST_DEGC, NO_SENSOR_LIVES_DEGC = -25.0, 250.0
+"""What a drive in operation may show, and what none outlives, so that its register is misread."""
+
 
 def check_failed(results: Sequence[CheckResult]) -> CheckFailed | None:
     """The first check that failed, as the error that it is."""
@@ -102,14 +108,26 @@ def judge_drive(
         *_interlocks(last),
         _at_rest(statuses),
         *_dc_link(statuses, limits),
-        _below("heatsink temperature, degC", last.heatsink_degc, limits.heatsink_max_degc, "let the drive cool down"),
-        _below("winding temperature, degC", last.winding_degc, limits.winding_max_degc, "let the motor cool down"),
+        _below(
+            "heatsink temperature, degC",
+            "heatsink_degc",
+            last.heatsink_degc,
+            limits.heatsink_max_degc,
+            "let the drive cool down",
+        ),
+        _below(
+            "winding temperature, degC",
+            "winding_degc",
+            last.winding_degc,
+            limits.winding_max_degc,
+            "let the motor cool down",
+        ),
         CheckResult(
             "drive rated for the test current",
             identity.rated_drive_current_a * math.sqrt(2) >= SMALLEST_DRIVE * test_current_a,
             round(identity.rated_drive_current_a * math.sqrt(2), 3),
             f"at least {SMALLEST_DRIVE * test_current_a:.3g} A peak",
-            "lower limits.current_fraction or use a larger drive",
+            _remedy("lower limits.current_fraction or use a larger drive", _foreign_drive(identity, test_current_a)),
         ),
         *keeps_up(pace, identity.control_period_s),
         *_same_motor(drive_nameplate, nameplate),
@@ -169,7 +187,10 @@ def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[C
         in_range,
         round(shown_v, 1 if in_range else 3),
         f"{limits.dc_link_min_v:g} ... {limits.dc_link_max_v:g} V",
-        "check the supply voltage and the pre-charge",
+        _remedy(
+            "check the supply voltage and the pre-charge",
+            misread("dc_link_v", shown_v, limits.dc_link_min_v, limits.dc_link_max_v, "V"),
+        ),
     )
     change = (max(volts) - min(volts)) / max(abs(volts[-1]), 1.0)
     yield CheckResult(
@@ -213,15 +234,27 @@ def keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[CheckR
     )
 
 
-def _below(name: str, value: float, limit: float, remedy: str) -> CheckResult:
+def _below(name: str, key: str, value: float, limit: float, remedy: str) -> CheckResult:
     """NaN means that no sensor is fitted, which is not a failure."""
     return CheckResult(
         name,
         math.isnan(value) or value <= limit,
         "no sensor" if math.isnan(value) else round(value, 1),
         f"at most {limit:g} °C" if math.isfinite(limit) else "no limit known",
-        remedy,
+        _remedy(remedy, misread(key, value, COLDEST_DEGC, limit, "°C") if value > NO_SENSOR_LIVES_DEGC else ""),
     )
+
+
+def _foreign_drive(identity: DriveIdentity, test_current_a: float) -> str:
+    """What to try where the drive says that it is far too small for its motor."""
+    rated_a = identity.rated_drive_current_a
+    if rated_a * math.sqrt(2) >= FAR_TOO_SMALL * test_current_a:
+        return ""
+    return misread("rated_drive_current_a", rated_a, test_current_a / 2.0, 3.0 * test_current_a, "A")
+
+
+def _remedy(usual: str, misreading: str) -> str:
+    return f"{usual}; {misreading}" if misreading else usual
 
 
 def _same_motor(drive_nameplate: Mapping[str, float], nameplate: Nameplate) -> Iterator[CheckResult]:
@@ -235,5 +268,8 @@ def _same_motor(drive_nameplate: Mapping[str, float], nameplate: Nameplate) -> I
             abs(value - wanted) <= NAMEPLATE_TOLERANCE * wanted,
             round(value, 4),
             f"{wanted:g} within {NAMEPLATE_TOLERANCE:.0%}",
-            f"check which motor is connected; correct --motor or the drive's {key}",
+            _remedy(
+                f"check which motor is connected; correct --motor or the drive's {key}",
+                misread(key, value, wanted * (1.0 - NAMEPLATE_TOLERANCE), wanted * (1.0 + NAMEPLATE_TOLERANCE)),
+            ),
         )

@@ -15,7 +15,7 @@ from commissioner.identify.excite.duration import LongerTest, longer_test
 from commissioner.identify.excite.tones import DesignedExcitation
 from commissioner.identify.inverter.first_current import FirstCurrent
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, InverterError, Staircase
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.nameplate import prior
 from commissioner.motor.plate_match import PlateMatch
 from commissioner.procedure.assembly import assemble, highest_stator_flux_wb
@@ -214,6 +214,7 @@ def judge(job: Job, findings: Findings) -> Step:
         evidence_of(identification),
         guard_acted=findings.guard_acted,
         beyond_time=longer.in_vain_for if longer else frozenset(),
+        held=_held(findings.snapshot),
     )
     findings.plate_match = match_of(evidence.combined, job.nameplate)
     verdict = decide(evidence, job.nameplate, job.plan.acceptance, write_back=job.write_back)
@@ -225,6 +226,13 @@ def judge(job: Job, findings: Findings) -> Step:
     return {Decision.WRITE_BACK: Event.WRITE_BACK, Decision.KEEP: Event.KEEP, Decision.REJECT: Event.REJECT}[
         verdict.decision
     ]
+
+
+def _held(snapshot: ParameterSnapshot | None) -> dict[str, float]:
+    """What the drive held in use, by our names where its own name is ours without a unit."""
+    in_use = snapshot.in_use if snapshot is not None else {}
+    ours = {name: name.removesuffix("_ohm").removesuffix("_h") for name in PARAMETERS}
+    return {name: in_use[item] for name, item in ours.items() if item in in_use}
 
 
 def write(job: Job, findings: Findings) -> Step:

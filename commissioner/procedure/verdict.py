@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 
 from commissioner.identify.analysis import Identification, axis_at
+from commissioner.identify.estimate.held_back import HeldBack
 from commissioner.identify.estimate.turning import turning_doubt
 from commissioner.identify.intake.dc_link import LinkCourse
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
@@ -63,6 +64,10 @@ FOLLOWS = 0.5
 """Of what the DC link moved by: what two tests must have seen of it, and what their values do not follow it by on a drive that
 corrects its voltage. One that does not makes them follow by all of it."""
 
+NO_MOTOR_BELOW, NO_MOTOR_ABOVE = InverseGamma(1e-4, 1e-4, 1e-6, 1e-4), InverseGamma(500.0, 500.0, 1.0, 10.0)
+"""What motors from 50 W to some megawatts have: a drive that holds another motor's values holds values between these. Without the question
+0.0215 was written as millihenry where a file had forgotten the scale of 1e-3, read back as written, and called good."""
+
 Values = Mapping[str, Quantity]
 
 
@@ -83,6 +88,10 @@ class Evidence:
     beyond_time: frozenset[str] = frozenset()
     turned: tuple[tuple[float, float, float], ...] = ()
     link: LinkCourse | None = None
+    held_back: tuple[tuple[float, HeldBack], ...] = ()
+    """Axis and what the drive held back on it without saying so."""
+    held: Mapping[str, float] = field(default_factory=dict)
+    """What the drive held in use before, by parameter, as its file reads it; SI."""
 
 
 def evidence_of(identification: Identification) -> Evidence:
@@ -104,6 +113,7 @@ def evidence_of(identification: Identification) -> Evidence:
             if a.turning_rad_per_s
         ),
         link=identification.link,
+        held_back=tuple((a.axis_deg, a.held_back) for a in axes if a.held_back is not None),
     )
 
 
@@ -114,6 +124,7 @@ def _values(parameters: InverseGamma, std: Signal) -> Values:
 def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, write_back: bool) -> Verdict:
     """WRITE_BACK or KEEP where nothing objects, else REJECT with every objection, gravest first."""
     objections = (
+        *_held_back(evidence),
         *_another_motor(evidence.combined, plate),
         *_outside(evidence.combined, prior(plate)),
         *_turned(evidence, acceptance),
@@ -121,6 +132,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
         *_disagreements(evidence, acceptance),
         *_uncertain(evidence, acceptance),
         *_spread(evidence, acceptance),
+        *(_scaled(evidence) if write_back else ()),
         *(_unusual(evidence, acceptance) if acceptance.strict else ()),
     )
     if objections:
@@ -131,6 +143,18 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
 def match_of(combined: Values, plate: Nameplate) -> PlateMatch:
     """How the combined values fit the plate."""
     return plate_match(InverseGamma(*(combined[name].value for name in PARAMETERS)), plate)
+
+
+def _held_back(evidence: Evidence) -> Iterator[Objection]:
+    """Values of peaks that never came: how wrong they are no interval tells, for the fit took a part of what is missing for resistance."""
+    for axis_deg, held in evidence.held_back:
+        yield Objection(
+            f"the drive limits its {held.what} at axis {axis_deg:g} deg and does not say so: {held.sentence}",
+            f"{held.missing_v:.2g} V",
+            "none missing beyond what noise explains",
+            f"raise the drive's own {held.what} limit, or lower limits.current_fraction, so that the test stays below it; else look for a "
+            "current sensor at the end of its range",
+        )
 
 
 def _another_motor(combined: Values, plate: Nameplate) -> Iterator[Objection]:
@@ -245,6 +269,23 @@ def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
                 f"{acceptance.axis_spread_percent:g} %",
                 "compare the current sensors' gains and the three phases' resistances",
             )
+
+
+def _scaled(evidence: Evidence) -> Iterator[Objection]:
+    """A value in the drive that no motor has: what is written by the same scale would be as wrong, and would read back as right."""
+    for name in PARAMETERS:
+        held, measured = evidence.held.get(name, 0.0), evidence.combined[name].value
+        low, high = getattr(NO_MOTOR_BELOW, name), getattr(NO_MOTOR_ABOVE, name)
+        if held <= 0.0 or measured <= 0.0 or low <= held <= high:
+            continue
+        item, power = name.removesuffix("_ohm").removesuffix("_h"), round(math.log10(held / measured))
+        yield Objection(
+            f"the drive holds a {item.replace('_', ' ')} that no motor has: its scale in the drive file is wrong",
+            in_shown_unit(name, held),
+            in_shown_unit(name, low, high),
+            f"compare items.{item}, staged and stored ones too, with the drive's keypad: with {10.0**-power:g} times the scale it would be of the "
+            "measured one's size",
+        )
 
 
 def _unusual(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:

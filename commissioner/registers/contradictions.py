@@ -61,7 +61,7 @@ Problem = tuple[str, object, str]
 
 def check_contradictions(profile: DriveProfile) -> DriveProfile:
     """The profile itself. Raises ConfigurationError with the first thing that cannot be together with another."""
-    for check in (_limits, _bits, _units, _scales, _order, _numbers, _written, _bases, _supervision, _topics):
+    for check in (_limits, _bits, _units, _scales, _copies, _order, _numbers, _written, _bases, _supervision, _topics):
         for key, value, expected in check(profile):
             raise ConfigurationError(file=profile.file, key=key, value=value, expected=expected)
     return profile
@@ -123,6 +123,19 @@ def _scales(profile: DriveProfile) -> Iterator[Problem]:
         if not SMALLEST_SCALE <= item.scale <= LARGEST_SCALE:
             limits = f"{SMALLEST_SCALE:g} ... {LARGEST_SCALE:g}: value = raw number * scale"
             yield f"items.{item.name}.scale", item.scale, limits
+
+
+def _copies(profile: DriveProfile) -> Iterator[Problem]:
+    """A parameter's staged and stored registers count as its own does, where they are of its type: it is written in one and read in another."""
+    for name in profile.parameter_names:
+        own = profile.items.get(name)
+        for copy in (profile.items.get(f"staged_{name}"), profile.items.get(f"stored_{name}")):
+            if own is not None and copy is not None and copy.type == own.type and copy.scale != own.scale:
+                yield (
+                    f"items.{copy.name}.scale",
+                    copy.scale,
+                    f"{own.scale:g}, as items.{name} has, which is the same value",
+                )
 
 
 def _order(profile: DriveProfile) -> Iterator[Problem]:

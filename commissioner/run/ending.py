@@ -23,6 +23,7 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.documents import archive_lost
 from commissioner.run.archive.folder import RunFolder
+from commissioner.safety.watch import TOO_LATE
 
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
@@ -117,6 +118,13 @@ def with_link(error: CommissionerError, answer_s: float, watchdog_s: float | Non
         error.remedy = (
             f"use a link that answers sooner and evenly: a cable in place of radio, VPN or gateway; {error.remedy}"
         )
+    return error
+
+
+def with_shares(error: CommissionerError, host_s: float, link_s: float) -> CommissionerError:
+    """Samples that came too late though no gap and no answer stands out: where the time went, as many small delays add up."""
+    if error.what == TOO_LATE and host_s + link_s > 0.0:
+        error.what += f"; of the last {host_s + link_s:.2g} s this host took {host_s:.2g} s, and the link {link_s:.2g} s to answer"
     return error
 
 

@@ -28,6 +28,7 @@ from commissioner.run.ending import (
     with_host,
     with_link,
     with_master,
+    with_shares,
     write_lost,
 )
 from commissioner.run.holding.collector import set_aside, short_collections
@@ -236,9 +237,9 @@ class Runner:
         if not facts.energised:
             return error
         stats = self._inverter.port.stats
-        return with_link(
-            with_host(error, stats.longest_gap_s, facts.watchdog_s), stats.latency_s(1.0), facts.watchdog_s
-        )
+        error = with_host(error, stats.longest_gap_s, facts.watchdog_s)
+        error = with_link(error, stats.latency_s(1.0), facts.watchdog_s)
+        return with_shares(error, *stats.shares_s(facts.watchdog_s or 0.0))
 
     def _fetch(self) -> SampleBlock | None:
         """The next block, archived and judged; None once the drive has ended the session."""

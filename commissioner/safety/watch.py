@@ -10,6 +10,8 @@ import numpy as np
 from commissioner.errors import Aborted, DriveFault
 from commissioner.records import DriveStatus, SampleBlock, peak
 
+TOO_LATE = "the samples came too late"
+
 
 @dataclass(frozen=True)
 class StopReason:
@@ -77,7 +79,7 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
         )
     if not block.age_s <= limits.age_s:
         return StopReason(
-            "the samples came too late",
+            TOO_LATE,
             block.age_s,
             limits.age_s,
             "use a faster link or a host that is less busy",

@@ -348,7 +348,14 @@ class Firmware:
         e[at.E_FREQUENCY : at.E_FREQUENCY + 8] = tones[:, 1]
         e[at.E_PHASE : at.E_PHASE + 8] = tones[:, 2]
         self.s[at.S_TRIP_A] = min(v["current_limit_a"], self.setup.hardware_current_limit_a)
+        self.take_cuts()
         self._take_live()
+
+    def take_cuts(self) -> None:
+        """What this drive cuts off its output; its current limiter is stable at a fifth of the leakage's volts per ampere and period."""
+        setup, e = self.setup, self.e
+        e[at.E_LOST], e[at.E_MOST_V], e[at.E_MOST_A] = setup.lost_voltage, setup.most_voltage_v, setup.most_current_a
+        e[at.E_FOLDBACK_OHM] = 0.2 * self.plant.machine.leakage_inductance_h / self.plant.control_period_s
 
     def _take_live(self) -> None:
         v, e = self.values, self.e

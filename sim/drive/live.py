@@ -41,6 +41,17 @@ def _command(e, t, period):
 
 
 @kernel
+def _cut(e, u, i_axis):
+    """What reaches the motor (V) of a voltage that samples show as asked for: a part lost, a ceiling, a current folded back."""
+    u *= 1.0 - e[at.E_LOST]
+    u = min(e[at.E_MOST_V], max(-e[at.E_MOST_V], u))
+    excess = abs(i_axis) - e[at.E_MOST_A]
+    if excess > 0.0:
+        u -= math.copysign(e[at.E_FOLDBACK_OHM] * excess, i_axis)
+    return u
+
+
+@kernel
 def _has_ended(e, t):
     return t >= e[at.E_DURATION] and e[at.E_BIAS] == 0.0 and e[at.E_SCALE] == 0.0
 
@@ -106,7 +117,7 @@ def run_interrupts(n, x, p, e, s, c, white, history, means, ring, flags, trip):
         before = history[(k - 1) % HISTORY]
         points[at.POINTS - 1, 0] = before[at.POINTS - 1, 0]
         points[at.POINTS - 1, 1] = before[at.POINTS - 1, 1]
-        known = advance_period(x, p, m, u, axis, work, points, known)
+        known = advance_period(x, p, m, _cut(e, u, i_a * axis[0] + i_b * axis[1]), axis, work, points, known)
         c[at.C_PERIOD] = k + 1
     return n
 

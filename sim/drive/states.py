@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
 
 
@@ -63,3 +64,6 @@ class Setup:
     ignores: frozenset[str] = frozenset()
     refuses: frozenset[str] = frozenset()
     ring_capacity: int = 16384
+    lost_voltage: float = 0.0
+    most_voltage_v: float = math.inf
+    most_current_a: float = math.inf

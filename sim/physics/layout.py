@@ -108,7 +108,8 @@ POINTS = 5
     E_STEP_V,
 ) = range(12)
 E_AMPLITUDE, E_FREQUENCY, E_PHASE = 12, 20, 28
-E_COUNT = 36
+E_LOST, E_MOST_V, E_MOST_A, E_FOLDBACK_OHM = 36, 37, 38, 39  # what a drive cuts off its output and does not tell
+E_COUNT = 40
 
 # sensing ------------------------------------------------------------------------------------------------------
 (

@@ -8,6 +8,7 @@ command is carried out. Without it: from the first request on.
 from __future__ import annotations
 
 import math
+import random
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -29,8 +30,12 @@ WIRE = {
     "wrong_function": None,
     "short_reply": 1,
     "wrong_transaction": None,
+    "gateway": 11,
+    "drops_bytes": 1e-4,
 }
 """Faults of a single reply (or request) and their default argument."""
+TARGET_FAILED = 11
+"""Of a gateway's exceptions the one behind which the drive may have carried the request out; behind another it did not get it."""
 SERVER = {"stall": 1.0, "restart": 1.0, "half_open": None}
 DRIVE = {
     "overcurrent": None,
@@ -49,9 +54,27 @@ DRIVE = {
     "refuse": "watchdog_ms",
     "other_map": 100,
     "runs_away": None,
+    "loses_voltage": 0.2,
+    "clamps_voltage": 20.0,
+    "clamps_current": 5.0,
 }
+CUTS = {"loses_voltage": "lost_voltage", "clamps_voltage": "most_voltage_v", "clamps_current": "most_current_a"}
+"""What a drive does to its output without saying so (a part, V, A), and the fact of the drive that it is."""
 WRITE_REGISTERS = 16
-NUMBERED = {"late", "truncated", "wrong_unit", "short_reply", "stall", "restart", "overrun", "sample_gap", "other_map"}
+NUMBERED = {
+    "late",
+    "truncated",
+    "wrong_unit",
+    "short_reply",
+    "stall",
+    "restart",
+    "overrun",
+    "sample_gap",
+    "other_map",
+    "gateway",
+    "drops_bytes",
+    *CUTS,
+}
 
 
 class FaultError(Exception):
@@ -164,6 +187,8 @@ def _altered(fault: Fault, frame: bytes, is_rtu: bool, rebuild: Callable[[bytes]
         cut = 2 * int(float(fault.argument or 1))
         body = body[:-cut]
         body[2] -= cut
+    elif fault.name == "gateway":
+        body[1:] = body[1] | 0x80, int(float(fault.argument or TARGET_FAILED))
     elif fault.name == "wrong_transaction" and not is_rtu:
         return bytes([frame[0] ^ 0x11, frame[1] ^ 0x22]) + frame[2:]
     return rebuild(bytes(body))
@@ -209,6 +234,9 @@ def _misbehave(fault: Fault, drive: Firmware) -> None:
         drive.setup.runs_away = True
     elif fault.name == "ignore":
         drive.setup.ignores = drive.setup.ignores | {str(fault.argument)}
+    elif fault.name in CUTS:
+        setattr(drive.setup, CUTS[fault.name], float(fault.argument or 0.0))
+        drive.take_cuts()
     elif fault.name == "refuse":
         drive.setup.refuses = drive.setup.refuses | {str(fault.argument)}
 
@@ -221,6 +249,11 @@ class Plan:
         self.requests = 0
         self.writes = 0
         self.struck: set[int] = set()
+        self.chance = random.Random(1)
+
+    def thinned(self, fault: Fault, frame: bytes) -> bytes:
+        """What a line that loses this part of all bytes leaves of a frame."""
+        return bytes(byte for byte in frame if self.chance.random() >= float(fault.argument or 0.0))
 
     def arm(self, drive: Firmware) -> None:
         """Hang the timed drive faults into the drive's clock."""

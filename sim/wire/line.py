@@ -16,7 +16,7 @@ from pymodbus.pdu import ExceptionResponse
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusTlsServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 
-from sim.wire.faults import SERVER, WIRE, Fault, deliver
+from sim.wire.faults import SERVER, TARGET_FAILED, WIRE, Fault, deliver
 from sim.wire.pace import Pace
 from sim.wire.station import Drive, Options, sim_device
 
@@ -104,10 +104,15 @@ class Handler(ServerRequestHandler):
         self.hits = drive.plan.next_request(drive.firmware, pdu.function_code)
         if any(fault.name == "lost_request" for fault in self.hits):
             return
+        kept_back = next((f for f in self.hits if f.name == "gateway" and f.argument != TARGET_FAILED), None)
+        if kept_back is not None:
+            self.hits = []
+            self._refuse(pdu, int(float(kept_back.argument or 0)))
+            return
         if not self._server_fault():
             await super().handle_request()
 
-    def _refuse(self, pdu: Any, code: ExcCodes) -> None:
+    def _refuse(self, pdu: Any, code: int) -> None:
         answer = ExceptionResponse(pdu.function_code, code)
         answer.transaction_id, answer.dev_id = pdu.transaction_id, pdu.dev_id
         self.server_send(answer, None)
@@ -135,6 +140,9 @@ class Handler(ServerRequestHandler):
             if self.held:
                 held, self.held = self.held, b""
                 self._put(held, self.turned_at)
+            return
+        if fault.name == "drops_bytes":
+            self._put(self.line.drive.plan.thinned(fault, data), self.turned_at)
             return
         delivery = deliver(fault, data, self.line.is_rtu, self._rebuild(data))
         self.held += delivery.held

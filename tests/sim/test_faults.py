@@ -52,6 +52,30 @@ def test_late_reply_comes_after_the_client_gave_up_and_fools_a_naive_one(with_fa
     assert rtu.read(3, 2) == MAGIC  # asked for the firmware version, got the late magic: the trap
 
 
+@faults("gateway:6@1", "gateway:11@2")
+def test_a_gateway_refuses_for_the_drive_or_after_it(with_faults):
+    """Busy: the drive never got the request. Target failed: it did."""
+    tcp, drive = with_faults.tcp, with_faults.drive.firmware
+    for code, echoed in ((6, 0), (11, 78)):
+        with pytest.raises(Refused) as caught:
+            tcp.write_one(21, 78)
+        assert caught.value.code == code
+        assert drive.values["echo"] == echoed
+
+
+@faults("drops_bytes:0.05@1+")
+def test_a_line_that_loses_bytes_leaves_frames_short(with_faults):
+    """Of 9-byte answers 0.95^9 = 0.63 arrive whole."""
+    rtu, whole = with_faults.rtu, 0
+    rtu.timeout_s = 0.02
+    for _ in range(40):
+        try:
+            whole += rtu.read(0, 2) == MAGIC
+        except (Silent, AssertionError):
+            continue
+    assert 12 <= whole <= 37
+
+
 @faults("lost@1")
 def test_lost_reply_is_silence_but_the_request_was_executed(with_faults):
     with pytest.raises(Silent):

@@ -14,7 +14,7 @@ from sim.drive.firmware import Firmware
 from sim.drive.memory import Memory
 from sim.drive.states import Answer, Setup, State, Trip
 from sim.physics import layout as at
-from sim.physics.machine import Effect, Plant, Sensors
+from sim.physics.machine import Effect, Plant, PowerStage, Sensors
 from tests.sim.client import crc_bytes, floats
 
 MAP = load_map()
@@ -416,3 +416,25 @@ def test_no_links_word_wraps(nominal_v, step_v):
     counts = int(np.array(words[-2], np.uint16).view(np.int16))
     assert get(firmware, "dc_link_scale_v") == pytest.approx(step_v)
     assert counts * step_v == pytest.approx(1.1 * nominal_v, abs=step_v)
+
+
+@pytest.mark.parametrize(
+    ("cut", "settled_a"), [("lost_voltage", 0.8), ("most_voltage_v", 3.0 / 5.0), ("most_current_a", None)]
+)
+def test_what_a_drive_cuts_off_silently_is_missing_in_the_motor_and_not_in_the_samples(cut, settled_a):
+    """A DC bias settles where the volts that are left drive it, and at the ceiling of a current folded back; an ideal inverter."""
+    sizes = {"lost_voltage": 0.2, "most_voltage_v": 3.0, "most_current_a": 0.5}
+    stage = PowerStage(dead_time_s=0.0, threshold_v=0.0, slope_ohm=0.0)
+    plant = Plant(power_stage=stage)
+    whole_a = 5.0 / plant.machine.stator_resistance_ohm
+    bent = switch_on(
+        ready(drive(plant, Setup(**{cut: sizes[cut]})), tone_count=0, duration_s=20.0, test_time_limit_s=30.0)
+    )
+    bent.advance(8.0)
+    ring, newest = bent.samples, bent.produced - 1
+    assert ring.ring[newest % ring.capacity, 0] == round(5.0 / 0.01)
+    seen_a = bent.samples.largest_count() * bent.current_scale_a
+    if settled_a is not None:
+        assert seen_a == pytest.approx(settled_a * whole_a, rel=0.03)
+    else:
+        assert 0.5 <= seen_a < 0.7 < whole_a

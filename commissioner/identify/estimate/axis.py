@@ -18,6 +18,7 @@ from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.identify.batch.slow_noise import widened
 from commissioner.identify.batch.starts import from_impedance
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
+from commissioner.identify.estimate.held_back import HeldBack, held_back
 from commissioner.identify.estimate.sufficiency import require_conditioned
 from commissioner.identify.estimate.turning import turning_doubt, turning_rad_per_s
 from commissioner.identify.intake.alignment import more_periods
@@ -65,6 +66,7 @@ class AxisResult:
     staircase: Staircase | None
     energised_s: float
     turning_rad_per_s: float = 0.0
+    held_back: HeldBack | None = None
 
 
 @dataclass(frozen=True)
@@ -233,6 +235,7 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
         staircase=fit.staircase,
         energised_s=sum(s.voltage_v.size for s in stretches) * period_s,
         turning_rad_per_s=turning,
+        held_back=held_back(segments(stretches), batch, at_flux),
     )
 
 

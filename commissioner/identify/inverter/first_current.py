@@ -42,6 +42,8 @@ class HeldLevel:
     samples_a: Signal
 
 
+AS_ASKED = (0.8, 1.25)
+"""Of the voltage asked for, what the samples of a level held may show: a scale wrong by ten made another motor of the right one."""
 END = 0.1
 """The last part of a level, of which the mean is where the current ended."""
 
@@ -49,9 +51,10 @@ END = 0.1
 def first_current(levels: Sequence[HeldLevel], settled: Settled, sample_period_s: float) -> FirstCurrent:
     """From the same larger, smaller and larger level, and where their currents are heading.
 
-    DataRefused where the current did not follow the voltage.
+    DataRefused where the current did not follow the voltage, or the samples' voltage is not the one asked for.
     """
     larger, smaller, _ = levels
+    _require_asked_voltage(larger)
     first_a, smaller_a, last_a = (float(a) for a in settled.current_a)
     larger_a = 0.5 * (first_a + last_a)
     change_a, change_v = larger_a - smaller_a, larger.voltage_v - smaller.voltage_v
@@ -69,6 +72,17 @@ def first_current(levels: Sequence[HeldLevel], settled: Settled, sample_period_s
     moved_a = max(rise_a - fall_a, 1e-9)
     inductance_h, std_h = (up_wb - down_wb) / moved_a, slope_ohm * math.hypot(*doubts_as) / moved_a
     return FirstCurrent(inductance_h, std_h, slope_ohm, (larger.voltage_v, smaller.voltage_v), (larger_a, smaller_a))
+
+
+def _require_asked_voltage(level: HeldLevel) -> None:
+    seen_v = float(np.mean(level.samples_v[-_tail(level) :]))
+    if AS_ASKED[0] * abs(level.voltage_v) <= abs(seen_v) <= AS_ASKED[1] * abs(level.voltage_v):
+        return
+    raise DataRefused(
+        "the samples show another voltage than the drive was asked for", step="first current", value=f"{seen_v:.4g} V",
+        limit=f"{level.voltage_v:.4g} V as asked",
+        remedy="compare the scales of items.dc_bias_v and items.voltage_scale_v with the firmware; see that nothing else writes to this drive",
+    )  # fmt: skip
 
 
 def stepped_inductance_h(larger: HeldLevel, smaller: HeldLevel, settled: Settled, sample_period_s: float) -> float:

@@ -10,6 +10,7 @@ from commissioner.link.drive.items import Items, number
 from commissioner.motor.nameplate import RATED_VALUES
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.codec import Value
+from commissioner.registers.misread import misread_word
 from commissioner.registers.profile import IDENTITY_ITEMS, STATUS_ITEMS, DriveProfile
 from commissioner.registers.status import DriveState, decode_bits, decode_state
 
@@ -136,10 +137,13 @@ def _version(word: int) -> str:
 
 
 def _stranger(name: str, seen: object, wanted: object, profile: DriveProfile) -> IdentityMismatch:
+    """With what to try where the register holds the right value, read another way."""
+    way = misread_word(seen, wanted)
+    another = "check the URL, or name the drive file that fits this drive and firmware"
     return IdentityMismatch(
         f"this is not {profile.name}: {name} differs",
         step="identify",
         value=seen,
         limit=wanted,
-        remedy="check the URL, or name the drive file that fits this drive and firmware",
+        remedy=f"items.{name} (register {profile.items[name].address}): {way}" if way else another,
     )

@@ -56,6 +56,14 @@ _OTHER_FILE = (
 )
 READ_REMEDIES = dict.fromkeys((1, 2, 3), _OTHER_FILE)
 """A drive that will not read what its file describes is another one."""
+PROVEN = 20
+"""Answers from which on device number and line settings are known to be right: a line that lost one byte in a thousand was told to look at
+its baud rate and parity after 400 good answers."""
+DISTURBED = (
+    "answers came whole before, so that the settings are right and the line is disturbed: see its shield, earth and terminators, and that it "
+    "keeps off motor cables; a lower baud rate helps"
+)
+SILENT = "answers came before, so that the settings are right: check the drive's supply, the cable and its plugs"
 READING = frozenset({3, 4})
 """Function codes that read registers."""
 REMEDIES = {
@@ -319,7 +327,8 @@ class ModbusPort:
         self._client.comm_params.timeout_connect = self.reply_timeout_s
         self.stats.requests += 1
         start = self._clock()
-        self.stats.longest_gap_s = max(self.stats.longest_gap_s, start - self._answered_s)
+        gap_s = start - self._answered_s
+        self.stats.longest_gap_s = max(self.stats.longest_gap_s, gap_s)
         try:
             reply = send()
         except ModbusException as error:
@@ -332,6 +341,7 @@ class ModbusPort:
         finally:
             self._answered_s = self._clock()
             took_s = self._answered_s - start
+            self.stats.turns_s.append((gap_s, took_s))
             if took_s > HOST_STOPPED * self.reply_timeout_s:
                 self.stats.longest_gap_s = max(self.stats.longest_gap_s, took_s)
         if took_s <= HOST_STOPPED * self.reply_timeout_s:
@@ -409,7 +419,9 @@ class ModbusPort:
                 f"device {other} is another one than {self._device}: give its number as ?device={other} if it is the drive, "
                 "else correct the number in the drive or the gateway's table"
             )
-        if isinstance(self._url, RtuUrl):
+        if len(self.stats.latencies_s) >= PROVEN:
+            where = DISTURBED if isinstance(self._url, RtuUrl) and self._client.received else SILENT
+        elif isinstance(self._url, RtuUrl):
             line = f"{self._url.baud} Bd, parity {self._url.parity}, {self._url.stop_bits} stop"
             where = f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
         else:

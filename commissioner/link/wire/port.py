@@ -33,10 +33,21 @@ class LinkStats:
     """Longest time in which this host stood still: between an answer and the next request, or past every deadline of a request. Whoever
     measures sets it to 0."""
     latencies_s: deque[float] = field(default_factory=lambda: deque(maxlen=2048))
+    turns_s: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=2048))
+    """Of the latest requests: how long this host let pass since the answer before, and how long the answer took."""
 
     def latency_s(self, quantile: float) -> float:
         """The quantile (0 ... 1) of the latest 2048 latencies; NaN before the first answer."""
         return float(np.quantile(np.array(self.latencies_s), quantile)) if self.latencies_s else float("nan")
+
+    def shares_s(self, span_s: float) -> tuple[float, float]:
+        """What of the latest `span_s`, or a little more, passed in this host and on the link."""
+        host_s = link_s = 0.0
+        for gap_s, took_s in reversed(self.turns_s):
+            if host_s + link_s >= span_s:
+                break
+            host_s, link_s = host_s + gap_s, link_s + took_s
+        return host_s, link_s
 
     def as_dict(self) -> dict[str, float]:
         """Counts and latency quantiles, for the journal and the report."""

@@ -331,3 +331,22 @@ def test_wrong_parity_or_device_number_is_named_with_what_to_set(answer, value, 
         port.close()
     assert value in str(caught.value.value)
     assert remedy in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("garbled", "said"), [(True, "line is disturbed"), (False, "check the drive's supply, the cable and its plugs")]
+)
+def test_settings_that_have_proved_right_are_not_asked_for_again(garbled, said):
+    """Before the first answers they may be wrong; then it is the line, or the drive."""
+    with RtuDevice(Bank()) as device:
+        port = connect(device)
+        for answered in (0, 30):
+            device.script = lambda request, answer: [answer]
+            for _ in range(answered):
+                port.read(100, 1)
+            device.script = lambda request, answer: [b"\x33\x44\x55\x66"] if garbled else []
+            with pytest.raises(LinkError) as caught:
+                port.read(100, 1)
+            assert (said in caught.value.remedy) is (answered > 0)
+            assert (f"{BAUD} Bd" in caught.value.remedy) is (answered == 0)
+        port.close()

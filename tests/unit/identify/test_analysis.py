@@ -343,7 +343,7 @@ def test_a_fit_of_other_samples_is_not_taken_over():
 @pytest.mark.parametrize(("statistic", "shown"), [(20.13, "(20.13, limit 20.1)"), (26.4, "(26, limit 20.1)")])
 def test_what_is_beyond_a_limit_does_not_look_as_if_it_were_within(statistic, shown):
     result = SimpleNamespace(
-        axis_deg=0.0, disagreement_sigmas=0.0, whiteness=Whiteness(statistic), residual_rms_a=1.0, turning_rad_per_s=0.0,
+        axis_deg=0.0, disagreement_sigmas=0.0, whiteness=Whiteness(statistic), residual_rms_a=1.0, turning_rad_per_s=0.0, held_back=None,
         batch=SimpleNamespace(residuals=[np.random.default_rng(1).normal(size=1000)]),
     )  # fmt: skip
     said = analysis._remarks([result], RatedFlux(0.7, 1.0), 0.5, 0.5)

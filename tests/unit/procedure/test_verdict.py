@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from commissioner.identify.estimate.held_back import HeldBack
 from commissioner.identify.excite.duration import LongerTest
 from commissioner.identify.intake.dc_link import LinkCourse
 from commissioner.motor.circuit import PARAMETERS, SYMBOLS, InverseGamma, Quantity
@@ -110,6 +111,28 @@ def test_what_is_only_unusual_is_rejected_where_that_was_asked_for(unusual, word
         ).decision
         is Decision.WRITE_BACK
     )
+
+
+def test_a_drive_that_limits_silently_is_the_first_reason():
+    """However sure the values are: a current held back at 5 A made R_s 5 % too large, told to 0.9 %, and it was written."""
+    held = HeldBack("current", 5.1, "A", 3.4)
+    verdict = decide(Evidence(VALUES, ((0.0, VALUES),), held_back=((60.0, held),)), PLATE, ACCEPTANCE, write_back=True)
+    assert verdict.decision is Decision.REJECT
+    assert verdict.reason.startswith("the drive limits its current at axis 60 deg and does not say so")
+    assert "5.1 A: 3.4 V are missing there" in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("factor", "is_written"), [(1000.0, False), (1e-5, False), (0.1, True), (10.0, True), (0.0, True)]
+)
+def test_a_held_value_that_no_motor_has_keeps_anything_from_being_written(factor, is_written):
+    """One that some motor has may be another motor's, and is replaced."""
+    name = "leakage_inductance_h"
+    evidence = Evidence(VALUES, ((0.0, VALUES),), held={name: factor * VALUES[name].value})
+    verdict = decide(evidence, PLATE, ACCEPTANCE, write_back=True)
+    assert (verdict.decision is Decision.WRITE_BACK) is is_written
+    assert is_written or f"with {1 / factor:g} times the scale" in verdict.objections[0].remedy
+    assert decide(evidence, PLATE, ACCEPTANCE, write_back=False).decision is Decision.KEEP
 
 
 def test_a_shaft_that_turned_is_the_reason_where_it_makes_values_too_uncertain():

@@ -48,6 +48,8 @@ def changed(name, *changes):
         ("simulated", "items.power_factor.unit", "W", "items.power_factor.unit", "'%'"),
         ("simulated", "items.pole_pairs.unit", "A", "items.pole_pairs.unit", "no unit"),
         ("simulated", "items.rated_power_w.scale", 1e10, "items.rated_power_w.scale", "1e-09 ... 1e+09"),
+        ("simulated", "items.staged_stator_resistance.scale", 10.0, "items.staged_stator_resistance.scale", "1, as items.stator_resistance"),
+        ("simulated", "items.stored_leakage_inductance.scale", 1.0, "items.stored_leakage_inductance.scale", "0.001, as"),
         ("simulated", "items.rated_power_w.scale", 9e-10, "items.rated_power_w.scale", "1e-09 ... 1e+09"),
         ("yaskawa_a1000", "parameters.order", ["stator_resistance"] * 2, "parameters.order[1]", "parameters.order[0]"),
         ("yaskawa_a1000", "items.status_word.scale", 0.1, "items.status_word.scale", "read by its bits"),

@@ -12,8 +12,9 @@ SLOW_S = HENRY / OHM
 LARGE_V, SMALL_V = 4.0, 2.0
 
 
-def seen(held_s, noise_a, seed, *, sign=1.0):
-    """What a path of OHM and HENRY draws at 4, 2 and 4 V, each held for so long, through a sensor with so much noise."""
+def seen(held_s, noise_a, seed, *, sign=1.0, shown=1.0):
+    """What a path of OHM and HENRY draws at 4, 2 and 4 V, each held for so long, through a sensor with so much noise; `shown`: of the voltage, in the
+    samples."""
     rng, levels, approaches = np.random.default_rng(seed), [], []
     time_s = np.arange(0.0, held_s, PERIOD_S)
     before_a = LARGE_V / OHM
@@ -22,7 +23,7 @@ def seen(held_s, noise_a, seed, *, sign=1.0):
         true_a = end_a + (before_a - end_a) * np.exp(-time_s / SLOW_S)
         before_a = true_a[-1]
         current = sign * true_a + rng.normal(0.0, noise_a, time_s.size)
-        levels.append(HeldLevel(volts, np.full(time_s.size, volts), current))
+        levels.append(HeldLevel(volts, np.full(time_s.size, shown * volts), current))
         approaches.append(Approach(time_s, current))
     return first_current(levels, settle(approaches, SLOW_S), PERIOD_S)
 
@@ -52,3 +53,12 @@ def test_brief_levels_and_much_noise_are_less_sure():
 def test_a_current_against_the_voltage_is_refused():
     with pytest.raises(DataRefused, match="does not follow"):
         seen(0.4, 0.0, 1, sign=-1.0)
+
+
+@pytest.mark.parametrize("shown", [10.0, 0.1, 1.5, 0.5])
+def test_samples_of_another_voltage_than_was_asked_for_are_named_as_that(shown):
+    """A scale wrong by ten in the drive file was called another motor's inductance."""
+    with pytest.raises(DataRefused) as caught:
+        seen(0.6, 0.002, 1, shown=shown)
+    assert caught.value.what == "the samples show another voltage than the drive was asked for"
+    assert str(caught.value.value) == f"{shown * LARGE_V:.4g} V" and "items.voltage_scale_v" in caught.value.remedy
