@@ -28,6 +28,8 @@ the current in every block: all of a recording was `start`, a load step in it ha
 column was called unexplained.)"""
 STEADY_SHARE = 0.95
 """Of the samples of one steady load: what swings with the shaft makes a block of 20 ms look like a step now and then."""
+ONE_LOAD = 0.1
+"""Of the current a volt, by which it stays the same load: flicker of 2 % in the mains of a motor that saturates moved it by 0.07."""
 BLOCK_S = 0.02
 OPENING_S = 0.01
 """Before a contactor has opened: each pole waits for the zero of its own current."""
@@ -105,6 +107,14 @@ class Record:
     def is_steady(self) -> bool:
         """Whether there is one window, and hardly anything moves in it."""
         return len(self.windows) == 1 and bool(np.mean(self.windows[0].state == STATES.index("steady")) > STEADY_SHARE)
+
+    @property
+    def has_one_load(self) -> bool:
+        """Whether no start and no other load is in it: flickering mains, which make a steady load none, are no second one."""
+        means = (_means(window, self.period_s) for window in self.windows)
+        a_volt = np.array([c / max(v, 1e-9) for currents, volts in means for c, v in zip(currents, volts, strict=True)])
+        least, median, most = np.quantile(a_volt, (0.02, 0.5, 0.98))
+        return not self.has_start and bool(most - least < ONE_LOAD * median)
 
 
 def scales_of(plate: Nameplate) -> Scales:
@@ -441,14 +451,19 @@ def between(x: Array) -> Array:
     return out
 
 
+def _means(window: Window, period: float) -> tuple[list[float], list[float]]:
+    """Size of the current and of the voltage over blocks of a period of the supply."""
+    block = max(round(BLOCK_S / period), 1)
+    size, volts = np.hypot(*window.current[:, :2].T), np.hypot(*window.voltage[::2].T)
+    starts = range(0, window.count, block)
+    return [float(size[k : k + block].mean()) for k in starts], [float(volts[k : k + block].mean()) for k in starts]
+
+
 def _states(window: Window, scales: Scales, period: float) -> NDArray[np.int64]:
     """One of `STATES` for every sample, decided over blocks of a period of the supply."""
     block = max(round(BLOCK_S / period), 1)
-    size = np.hypot(window.current[:, 0], window.current[:, 1])
-    volts = np.hypot(*window.voltage[::2].T)
     out = np.zeros(window.count, np.int64)
-    means = [float(size[k : k + block].mean()) for k in range(0, window.count, block)]
-    fed = [float(volts[k : k + block].mean()) for k in range(0, window.count, block)]
+    means, fed = _means(window, period)
     a_volt = [mean / max(v, 1e-9) for mean, v in zip(means, fed, strict=True)]
     largest = np.maximum.accumulate(a_volt)
     started = not window.is_from_rest

@@ -149,7 +149,7 @@ def _held_back(evidence: Evidence) -> Iterator[Objection]:
     """Values of peaks that never came: how wrong they are no interval tells, for the fit took a part of what is missing for resistance."""
     for axis_deg, held in evidence.held_back:
         yield Objection(
-            f"the drive limits its {held.what} at axis {axis_deg:g} deg and does not say so: {held.sentence}",
+            f"the drive limits its {held.what} at axis {axis_deg:g} deg and does not say so, or a current sensor ends there: {held.sentence}",
             f"{held.missing_v:.2g} V",
             "none missing beyond what noise explains",
             f"raise the drive's own {held.what} limit, or lower limits.current_fraction, so that the test stays below it; else look for a "

@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 
 from commissioner.cli.screens.screen import out as screen
-from commissioner.cli.screens.screen import signs, table
+from commissioner.cli.screens.screen import signs, stacked, table
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.report.diagnosis.names import (
     class_name,
@@ -100,7 +100,7 @@ def _causes(document: Mapping[str, Any]) -> None:
         is_fit = cause.get("found_by") != "audit"
         rows.append(
             (
-                class_name(cause),
+                stacked(class_name(cause)),
                 main_quantity(cause),
                 part_word(cause["gain_share"], largest) if is_fit else "-",
                 sure(cause["confidence"]),

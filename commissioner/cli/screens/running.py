@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 
 from commissioner.cli.screens.screen import out as screen
-from commissioner.cli.screens.screen import signs, table
+from commissioner.cli.screens.screen import signs, stacked, table
 from commissioner.report.running.words import actions, class_name, headline, meaning, number, quantity, spoken, tone
 
 COLOURS = {"good": "green", "warn": "yellow", "bad": "red"}
@@ -24,7 +24,7 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
     gain = document["gain"]
     if document["causes"]:
         rows = [
-            (class_name(c), quantity(next(iter(c["parameters"].values()))), f"{100 * c['gain_share']:.1f} %", f"{100 * c['confidence']:.0f} %")
+            (stacked(class_name(c)), quantity(next(iter(c["parameters"].values()))), f"{100 * c['gain_share']:.1f} %", f"{100 * c['confidence']:.0f} %")
             for c in document["causes"]
         ]  # fmt: skip
         screen.print(table("", ("cause", "size", "part of what they explain", "sure of the name"), rows))

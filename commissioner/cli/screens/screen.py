@@ -140,6 +140,11 @@ def table(
     return made
 
 
+def stacked(names: str) -> str:
+    """The names of a class below each other: in one line they leave the columns beside them no room."""
+    return names.replace(" or ", " or\n")
+
+
 def shown(value: object, unit: str = "") -> str:
     """A value as a person reads it: four digits, no tails, a number in its unit."""
     return in_unit(f"{value:.4g}" if isinstance(value, float) else str(value), value, unit)

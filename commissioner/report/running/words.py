@@ -13,6 +13,8 @@ from commissioner.running.causes import CATALOGUE
 Document = Mapping[str, Any]
 LEAST_SHARE = 5e-4
 """Of the simulation's error: less is printed as none, and is none that matters."""
+UNTOLD = 3.0
+"""Standard deviations, in shares, of a size that says nothing: a saturation under one steady load was printed as 0 +- 58000 %."""
 UNITS = {"us": "µs", "ohm": "Ω"}
 
 
@@ -42,7 +44,12 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def quantity(entry: Mapping[str, Any], *, short: bool = False) -> str:
-    """`1.23 ± 0.04 %`: relative sizes in percent, others in their unit."""
+    """`1.23 ± 0.04 %`: relative sizes in percent, others in their unit; of a share that the data leave open, that they do."""
+    is_open = entry["unit"] == "" and (entry["std"] or 0.0) > UNTOLD * max(abs(entry["value"]), 1.0)
+    return "not told" if is_open else _figures(entry, short=short)
+
+
+def _figures(entry: Mapping[str, Any], *, short: bool = False) -> str:
     value, std, unit = entry["value"], entry["std"], entry["unit"]
     factor, tail = (100.0, " %") if unit == "" else (1.0, f" {UNITS.get(unit, unit)}")
     if short or not std:
@@ -55,8 +62,8 @@ def main_size(cause: Mapping[str, Any]) -> str:
     entry = next(iter(cause["parameters"].values()))
     amount = abs(entry["value"])
     if half_width(entry["std"] or 0.0) < amount:
-        return quantity({**entry, "value": amount}, short=True)
-    return quantity(entry)
+        return _figures({**entry, "value": amount}, short=True)
+    return _figures(entry)
 
 
 def sentence(cause: Mapping[str, Any]) -> str:
@@ -68,7 +75,9 @@ def sentence(cause: Mapping[str, Any]) -> str:
         for article in ("One", "A"):
             said = said.replace(f"{article} {one} ", f"{one.capitalize()} {phase} ")
     said += " (less)" if first["value"] < 0.0 and "differently" in said else ""
-    return said if not cause["equivalent"] else f"{said} ({class_name(cause)}: these data cannot say which)"
+    if not cause["equivalent"]:
+        return said
+    return f"{class_name(cause).capitalize()}: these data cannot say which. The first would mean: {said[0].lower()}{said[1:]}"
 
 
 def headline(document: Document) -> str:
@@ -111,12 +120,14 @@ def meaning(document: Document) -> list[str]:
 
 
 def _members(document: Document) -> list[tuple[str, str]]:
-    """Every name of every cause, with how it is spoken of: of a class, `if it is` one of them."""
-    return [
-        (name, f"if it is {spoken(name)}" if c["equivalent"] else spoken(name))
-        for c in document["causes"]
+    """Every name of every cause once, with how it is spoken of: of a class, `if it is` one of them."""
+    of_class = {
+        name: f"if it is {spoken(name)}" if c["equivalent"] else spoken(name)
+        for c in reversed(document["causes"])
         for name in (c["name"], *c["equivalent"])
-    ]
+    }
+    order = dict.fromkeys(name for c in document["causes"] for name in (c["name"], *c["equivalent"]))
+    return [(name, of_class[name]) for name in order]
 
 
 def actions(document: Document) -> list[tuple[str, str]]:

@@ -48,7 +48,7 @@ def tied_in(name: str, record: Record) -> tuple[str, ...]:
     the little that harmonics and noise tell parts them by what its own laws lack. (Four of four turn faults of another simulator under one steady
     load and mains of 1.2 to 3 % unbalance, two of them without a speed, were a voltage gain, 0.99 sure.)
     """
-    lacking = {"a start": not record.has_start, "a second load": record.is_steady}
+    lacking = {"a start": not record.has_start, "a second load": record.has_one_load}
     return _alike(name, lambda c: c.is_always_tied or lacking.get(c.tied_without, False))
 
 

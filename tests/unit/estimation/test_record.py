@@ -212,3 +212,19 @@ def test_the_mains_unbalance_is_read_off_while_their_frequency_drifts_and_their_
     angle = 314.16 * t + 0.4 * np.sin(2.0 * t)
     z = 326.6 * (np.exp(1j * angle) + 0.02 * np.exp(-1j * (angle + 1.0)) + 0.04 * np.exp(-1j * (5.0 * angle + 2.0)))
     assert negative_sequence(np.stack([z.real, z.imag], axis=1)) == pytest.approx(0.02 * 326.6, rel=0.05)
+
+
+@pytest.mark.parametrize(("swing", "is_one"), [(0.0, True), (0.02, True), (0.3, False)])
+def test_flicker_is_no_second_load(start, swing, is_one):
+    """Voltage and current that swing together by 2 %, once a 0.1 s: no block of them is steady, and the load is one all the same."""
+    recording, plate = start
+    late = recording.time_s > 0.6
+    t = recording.time_s[late]
+    swung = 1.0 + 0.02 * np.sin(2.0 * np.pi * 10.0 * t)
+    loaded = 1.0 + swing * (t > t[t.size // 2])
+    one = replace(
+        recording, time_s=t, voltages_v=tuple(swung * np.cos(314.0 * t + a) * 326.0 for a in (0.0, -2.0 * np.pi / 3.0, 2.0 * np.pi / 3.0)),
+        currents_a=tuple(swung * loaded * np.cos(314.0 * t + a - 0.6) * 6.0 for a in (0.0, -2.0 * np.pi / 3.0, 2.0 * np.pi / 3.0)), speed_rad_per_s=None,
+    )  # fmt: skip
+    assert prepare([one], plate).has_one_load is is_one
+    assert not prepare([recording], plate).has_one_load

@@ -39,12 +39,13 @@ def test_confounders_are_known_both_ways_and_exist():
 
 def test_a_current_of_negative_sequence_has_one_class_as_long_as_no_start_parts_it():
     steady, stepped, started = (
-        SimpleNamespace(has_start=s, is_steady=one) for s, one in ((False, True), (False, False), (True, False))
+        SimpleNamespace(has_start=s, has_one_load=one) for s, one in ((False, True), (False, False), (True, False))
     )
     for name, in_steady, in_steps in (
         ("voltage_gain_mismatch", {"stator_asymmetry", "line_resistance"}, {"stator_asymmetry"}),
         ("stator_asymmetry", {"voltage_gain_mismatch", "line_resistance"}, {"voltage_gain_mismatch"}),
         ("line_resistance", {"voltage_gain_mismatch", "stator_asymmetry"}, set()),
+        ("speed_sensor_gain", {"rotor_skin_effect"}, set()),
         ("sampling_delay", {"sensor_lag"}, {"sensor_lag"}),
     ):
         assert set(tied_in(name, steady)) == in_steady

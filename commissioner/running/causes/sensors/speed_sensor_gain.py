@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commissioner.running.causes.cause import Cause, Form
+from commissioner.running.causes.cause import Cause, Confounder, Form
 
 CAUSE = Cause(
     name="speed_sensor_gain",
@@ -19,4 +19,5 @@ CAUSE = Cause(
     scenario=lambda v, s: {"size": v["speed_gain"]},
     needs=lambda record: record.has_speed,
     is_of_measurement=True,
+    confounders=(Confounder("rotor_skin_effect", "a start, or two loads", tied_without="a second load"),),
 )
