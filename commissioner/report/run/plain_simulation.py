@@ -184,10 +184,12 @@ def _moved(subject: Subject, diagnosis: Record) -> Iterator[tuple[Text, ...]]:
 
 
 def _fluxes(subject: Subject) -> Markup:
+    """L_M falls with flux, and with it R_R and L_sigma, which the inverse-Gamma form takes by the rotor's share of the flux."""
     flux = digits(subject.result["holds_for_stator_flux_wb"], 3)
-    return Markup("The diagnosis gives {} at small flux, page 1 at {} Wb: both are right, each at its flux.").format(
-        BY_FIELD["magnetizing_inductance_h"].symbol, flux
-    )
+    names = ("magnetizing_inductance_h", "rotor_resistance_ohm", "leakage_inductance_h")
+    return Markup(
+        "The diagnosis gives {}, and with it {} and {} of this circuit, at small flux, page 1 at {} Wb: both are right, each at its flux."
+    ).format(*(BY_FIELD[name].symbol for name in names), flux)
 
 
 def _experiment(diagnosis: Record) -> Markup | None:
