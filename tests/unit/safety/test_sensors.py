@@ -363,17 +363,37 @@ def single_phase(phase, axis_deg, peak_a=4.0, noise=1.0, leak=0.0, step_a=1e-9):
     ("phase", "axis_deg"), [(1, 0.0), (2, 0.0), (0, 60.0), (1, 60.0), (0, 120.0), (2, 120.0), (1, 90.0)]
 )
 def test_an_open_phase_is_named_as_one_and_is_no_sensors_fault(phase, axis_deg):
-    reason = single_phase(phase, axis_deg)
+    reason = single_phase(phase, axis_deg, peak_a=8.0)
     assert reason is not None
     assert reason.what.startswith(f"phase {'uvw'[phase]} carries no current")
     assert not reason.is_fault
     assert reason.value < 0.01
+    asked_a = abs(phase_cosines(axis_deg)[phase]) * single_phase_size(phase, axis_deg, 8.0)
+    assert float(reason.limit.removesuffix(" A")) == pytest.approx(asked_a, rel=0.2)
+
+
+def single_phase_size(phase, axis_deg, peak_a):
+    """Current along the axis, rms of a sine, that flows through the two other phases, as half their difference drives it."""
+    cosines = phase_cosines(axis_deg)
+    forth, back = (cosines[other] for other in range(3) if other != phase)
+    return peak_a / math.sqrt(2.0) * (forth - back) ** 2 / 3.0
+
+
+def test_a_gain_that_is_low_beside_a_phase_with_hardly_any_current_is_no_open_phase():
+    """A tenth of the axis current is what an open phase may show; at 84 deg a sound one shows no more."""
+    assert verdict(axis_deg=84.03, damage=of_phase(0, lambda i: 0.94 * i), offset=(0.0, 0.0, 0.0)) is None
 
 
 @pytest.mark.parametrize(
     "how",
-    [{"peak_a": 3.0, "noise": 20.0}, {"peak_a": 8.0}, {"peak_a": 8.0, "leak": 0.06}, {"step_a": 0.1}],
-    ids=["noise", "large", "leak", "one and the same number of a coarse converter"],
+    [
+        {"peak_a": 3.0, "noise": 20.0},
+        {"peak_a": 8.0},
+        {"peak_a": 8.0, "leak": 0.06},
+        {"step_a": 0.1},
+        {"leak": 0.1, "step_a": 0.5},
+    ],
+    ids=["noise", "large", "leak", "one and the same number of a coarse converter", "steps of a coarse converter"],
 )
 def test_an_open_phase_is_named_beside_noise_and_a_leak_and_at_any_size(how):
     reason = single_phase(1, 0.0, **how)
@@ -390,7 +410,7 @@ def test_a_silent_sensor_is_no_open_phase(phase):
     assert reason.is_fault
 
 
-def stopping(after, voltage_v, current_a, seconds=1.0, axis_deg=0.0, step_a=1e-9):
+def stopping(after, voltage_v, current_a, seconds=1.0, axis_deg=0.0, step_a=1e-9, offset_a=0.0):
     """A window watch over a current that is there until `after` (s), and the time of what it says."""
     watch, noise = SensorWatch(LIMIT_A), np.random.default_rng(5)
     cosines = np.array(phase_cosines(axis_deg))[:, None]
@@ -399,7 +419,7 @@ def stopping(after, voltage_v, current_a, seconds=1.0, axis_deg=0.0, step_a=1e-9
         on = time_s >= ZERO_S
         volts = np.where(on, voltage_v(time_s), 0.0)
         axis = np.where(on & (time_s < after), current_a(time_s), 0.0)
-        u, v, w = step_a * np.round((cosines * axis + noise.normal(0.0, 0.003, (3, ROWS))) / step_a)
+        u, v, w = step_a * np.round((cosines * axis + offset_a + noise.normal(0.0, 0.003, (3, ROWS))) / step_a)
         block = SampleBlock(
             session=1, first_index=number * ROWS, sample_period_s=PERIOD_S, axis_deg=axis_deg, voltage_axis_v=volts, current_u_a=u,
             current_v_a=v, current_w_a=w, dc_link_v=540.0, lost_before=0, clipped=False,
@@ -457,4 +477,23 @@ def test_a_smaller_voltage_than_drove_the_current_may_drive_none(step_a):
     reason, _ = stopping(
         0.6, lambda t: np.where(t < 0.6, 20.0, 10.0), lambda t: 4.0 + np.sin(300.0 * t), 14.0, step_a=step_a
     )
+    assert reason is None
+
+
+def test_a_current_that_stopped_is_seen_beside_offsets():
+    reason, _ = stopping(0.6, lambda t: 20.0 * np.cos(300.0 * t), lambda t: 4.0 * np.cos(300.0 * t), offset_a=0.4)
+    assert reason is not None
+    assert reason.what.startswith("no current flows any more")
+
+
+def test_a_current_that_a_smaller_voltage_does_not_drive_has_not_stopped():
+    """What an inverter loses may take all of four fifths of a voltage that drove one."""
+    reason, _ = stopping(
+        0.6, lambda t: np.where(t < 0.6, 20.0, 16.0) * np.cos(300.0 * t), lambda t: 4.0 * np.cos(300.0 * t)
+    )
+    assert reason is None
+
+
+def test_a_current_below_a_converters_step_has_not_surely_flowed():
+    reason, _ = stopping(0.6, lambda t: 20.0 * np.cos(300.0 * t), lambda t: 0.07 * np.cos(300.0 * t), step_a=0.1)
     assert reason is None
