@@ -31,7 +31,7 @@ from commissioner.procedure.findings import (
 from commissioner.procedure.link_plan import LinkPlan, plan_link
 from commissioner.procedure.plan import BELOW_TRIP, Job
 from commissioner.procedure.states import ENDED, ENERGISED, Event, State, follow
-from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of, match_of
+from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, drive_name, evidence_of, match_of
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.safety.commands import (
     ArmWatchdog,
@@ -231,8 +231,7 @@ def judge(job: Job, findings: Findings) -> Step:
 def _held(snapshot: ParameterSnapshot | None) -> dict[str, float]:
     """What the drive held in use, by our names where its own name is ours without a unit."""
     in_use = snapshot.in_use if snapshot is not None else {}
-    ours = {name: name.removesuffix("_ohm").removesuffix("_h") for name in PARAMETERS}
-    return {name: in_use[item] for name, item in ours.items() if item in in_use}
+    return {name: in_use[drive_name(name)] for name in PARAMETERS if drive_name(name) in in_use}
 
 
 def write(job: Job, findings: Findings) -> Step:

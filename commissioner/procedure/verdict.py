@@ -140,6 +140,11 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
     return Verdict(Decision.WRITE_BACK if write_back else Decision.KEEP, ())
 
 
+def drive_name(parameter: str) -> str:
+    """Of a drive's item that is called as our parameter is: without its unit."""
+    return parameter.removesuffix("_ohm").removesuffix("_h")
+
+
 def match_of(combined: Values, plate: Nameplate) -> PlateMatch:
     """How the combined values fit the plate."""
     return plate_match(InverseGamma(*(combined[name].value for name in PARAMETERS)), plate)
@@ -278,7 +283,7 @@ def _scaled(evidence: Evidence) -> Iterator[Objection]:
         low, high = getattr(NO_MOTOR_BELOW, name), getattr(NO_MOTOR_ABOVE, name)
         if held <= 0.0 or measured <= 0.0 or low <= held <= high:
             continue
-        item, power = name.removesuffix("_ohm").removesuffix("_h"), round(math.log10(held / measured))
+        item, power = drive_name(name), round(math.log10(held / measured))
         yield Objection(
             f"the drive holds a {item.replace('_', ' ')} that no motor has: its scale in the drive file is wrong",
             in_shown_unit(name, held),

@@ -14,19 +14,9 @@ POWERS = (1, -1, 2, -2, 3, -3)
 """Of ten, the likelier first."""
 _ORDERS = {
     (2, 3, 0, 1): "its two words are exchanged: try the other link.word_order",
-    (
-        1,
-        0,
-        3,
-        2,
-    ): "its bytes are exchanged within each word, which no drive file can undo: see the gateway's or the drive's setting",
-    (
-        3,
-        2,
-        1,
-        0,
-    ): "its four bytes stand in reverse: try the other link.word_order, and see the gateway's or the drive's setting",
-}
+    (1, 0, 3, 2): "its bytes are exchanged within each word, which no drive file can undo: see the gateway's or the drive's setting",
+    (3, 2, 1, 0): "its four bytes stand in reverse: try the other link.word_order, and see the gateway's or the drive's setting",
+}  # fmt: skip
 """Of the four bytes as they were read: what would put them right."""
 
 

@@ -224,13 +224,15 @@ def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], l
     segment = columns.get("segment", np.zeros(time.size))
     if segment.size != time.size:
         return dict(columns), []
-    is_shared = bool(np.any((np.diff(time) == 0.0) & (np.diff(segment) == 0.0)))
+    steps = np.diff(time)[np.diff(segment) == 0.0]
+    is_shared = bool(np.any(steps == 0.0))
+    if not is_shared and _unevenness(steps) <= ROUNDED:
+        return dict(columns), []
     edges = np.concatenate([[0], np.flatnonzero(np.diff(segment) != 0.0) + 1, [time.size]])
     parts = [slice(int(a), int(b)) for a, b in pairwise(edges)]
     period = _period([time[p] for p in parts])
     if period is None:
         return dict(columns), []
-    steps = np.diff(time)[np.diff(segment) == 0.0]
     printed = np.full(time.size, _printing_step(time)) if is_shared else _rounded_to(time, steps, period)
     if printed is None:
         return dict(columns), []
@@ -248,10 +250,16 @@ def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], l
     return {**columns, "time_s": mended}, [note]
 
 
+def _unevenness(steps: Signal) -> float:
+    """Of the mean step, by which one leaves it; 0 of none. Asked of every recording: a line through the stamps takes many times as long."""
+    mean = float(np.mean(steps)) if steps.size else 0.0
+    return float(np.max(np.abs(steps - mean))) / mean if mean > 0.0 else 0.0
+
+
 def _rounded_to(time: Signal, steps: Signal, period_s: float) -> Signal | None:
-    """The last digit's worth of every stamp, where it explains steps that are uneven by more than is let pass; else None."""
+    """The last digit's worth of every stamp, where it explains how uneven the steps are; else None."""
     uneven_s = float(np.max(np.abs(steps - period_s), initial=0.0))
-    if not ROUNDED * period_s < uneven_s < period_s or period_s < LEAST_STEP_S:
+    if uneven_s >= period_s or period_s < LEAST_STEP_S:
         return None
     printed = printed_step(time)
     return printed if uneven_s <= printed.max() + 1e-12 < period_s else None

@@ -43,10 +43,10 @@ def number(value: float, digits: int = 3) -> str:
     return f"{round(value, places):.{places}f}"
 
 
-def quantity(entry: Mapping[str, Any], *, short: bool = False) -> str:
+def quantity(entry: Mapping[str, Any]) -> str:
     """`1.23 ± 0.04 %`: relative sizes in percent, others in their unit; of a share that the data leave open, that they do."""
     is_open = entry["unit"] == "" and (entry["std"] or 0.0) > UNTOLD * max(abs(entry["value"]), 1.0)
-    return "not told" if is_open else _figures(entry, short=short)
+    return "not told" if is_open else _figures(entry)
 
 
 def _figures(entry: Mapping[str, Any], *, short: bool = False) -> str:
@@ -116,18 +116,18 @@ def meaning(document: Document) -> list[str]:
             f"Seen: {error.get('value')}; expected: {error.get('limit')}; step: {error.get('step')}.",
         ]
     out = [said(str(document["reason"]))] if document["verdict"] in ("unexplained", "not_distinguishable") else []
-    return out + [f"{who.capitalize()}: {CATALOGUE[name].meaning}" for name, who in _members(document)]
+    return out + [f"{_who(name, in_class)}: {CATALOGUE[name].meaning}" for name, in_class in _members(document).items()]
 
 
-def _members(document: Document) -> list[tuple[str, str]]:
-    """Every name of every cause once, with how it is spoken of: of a class, `if it is` one of them."""
-    of_class = {
-        name: f"if it is {spoken(name)}" if c["equivalent"] else spoken(name)
-        for c in reversed(document["causes"])
-        for name in (c["name"], *c["equivalent"])
-    }
-    order = dict.fromkeys(name for c in document["causes"] for name in (c["name"], *c["equivalent"]))
-    return [(name, of_class[name]) for name in order]
+def _members(document: Document) -> dict[str, bool]:
+    """Every name of every cause, and whether it is one of a class that these data do not tell apart."""
+    causes = document["causes"]
+    names = [(name, bool(c["equivalent"])) for c in causes for name in (c["name"], *c["equivalent"])]
+    return dict.fromkeys((name for name, _ in names), False) | dict(reversed(names))
+
+
+def _who(name: str, in_class: bool) -> str:
+    return f"If it is {spoken(name)}" if in_class else spoken(name).capitalize()
 
 
 def actions(document: Document) -> list[tuple[str, str]]:
@@ -135,9 +135,9 @@ def actions(document: Document) -> list[tuple[str, str]]:
     rows = [
         (
             "for the measurement" if CATALOGUE[name].is_of_measurement else "for the motor and drive",
-            f"{who.capitalize()}: {CATALOGUE[name].remedy}" if who.startswith("if") else CATALOGUE[name].remedy,
+            f"{_who(name, in_class)}: {CATALOGUE[name].remedy}" if in_class else CATALOGUE[name].remedy,
         )
-        for name, who in _members(document)
+        for name, in_class in _members(document).items()
     ]
     plan = document["next_experiment"]
     return [
