@@ -119,9 +119,11 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
     has_soft, has_soft_r = p[SOFT] != 0.0, p[SOFT_R] != 0.0
     has_bar, has_heat = p[BAR] != 0.0, (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
     has_cage = (p[CAGE] != 0.0) or (p[CAGE + 1] != 0.0)
-    has_loop = False
-    for j in range(2 * len(LOOP_A)):
-        has_loop = has_loop or p[LOOP + j] != 0.0
+    has_loop, x_loops = False, np.empty(len(LOOP_A), dtype=p.dtype)
+    for j in range(len(LOOP_A)):
+        g, b = p[LOOP + 2 * j], p[LOOP + 2 * j + 1]
+        has_loop = has_loop or g != 0.0 or b != 0.0
+        x_loops[j] = _reactance(g, b, w_n * period)
     has_line = (p[LINE] != 0.0) or (p[LINE + 1] != 0.0)
     has_dead = p[DEAD] != 0.0
     has_ripple = (p[W_RIPPLE] != 0.0) or (p[W_RIPPLE + 1] != 0.0)
@@ -198,13 +200,13 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
             # shorted turns lie in the winding: R_s takes (i_k - mu i_f), which is the machine's own current without what the terminals
             # take for them (Tallam, Habetler, Harley, IEEE Trans. Ind. Appl. 38(4), 2002)
             shorted_a, shorted_b = one, one
+            k[stage, 10] = one
             if has_loop:
-                k[stage, 10] = one
                 for j in range(len(LOOP_A)):
                     ca, cb = LOOP_A[j], LOOP_B[j]
                     g, b, along = p[LOOP + 2 * j], p[LOOP + 2 * j + 1], ua * ca + ub * cb
                     linked = w_n * (y[0] * ca + y[1] * cb)
-                    x_loop = _reactance(g, b, w_n * h)
+                    x_loop = x_loops[j]
                     if x_loop.real > 0.0:
                         # a resistance and a leakage, not a conductance and a susceptance: of the mains' harmonics they take less
                         if y[10].real >= UNSET:
@@ -261,8 +263,6 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 k[stage, 6], k[stage, 7] = hot * (ia * ia + ib * ib), hot * (ra * ra + rb * rb)
             else:
                 k[stage, 6], k[stage, 7] = one, one
-            if not has_loop:
-                k[stage, 10] = one
             if is_free:
                 torque = 1.5 * pairs * (y[3] * ra - y[2] * rb)
                 share = w / w_n

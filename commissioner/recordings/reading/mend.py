@@ -150,7 +150,7 @@ def with_running_time(
     time = columns.get("time_s")
     if time is None or time.size < LEAST_ROWS or np.median(np.diff(time)) != 0.0:
         return dict(columns), []
-    step, interval = _printing_step(time), clock.interval_s
+    step, interval = _least_step(time), clock.interval_s
     made = None if interval is None else time[0] + interval * np.arange(time.size, dtype=np.float64)
     if made is None or (step > 0.0 and np.ptp(time - made) > 2.0 * step):
         stamps = np.unique(time).size
@@ -233,7 +233,7 @@ def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], l
     period = _period([time[p] for p in parts])
     if period is None:
         return dict(columns), []
-    printed = np.full(time.size, _printing_step(time)) if is_shared else _rounded_to(time, steps, period)
+    printed = np.full(time.size, _least_step(time)) if is_shared else _rounded_to(time, steps, period)
     if printed is None:
         return dict(columns), []
     mended = np.empty_like(time)
@@ -273,11 +273,11 @@ def _period(parts: list[Signal]) -> float | None:
     weights = [float(p.size) for p in long]
     slopes = [float(np.polyfit(np.arange(p.size), p - p[0], 1)[0]) for p in long]
     period = float(np.average(slopes, weights=np.power(weights, 3)))
-    step = max(_printing_step(p) for p in parts)
+    step = max(_least_step(p) for p in parts)
     return period if period > 0.0 and step < MOST_REPEATED * period else None
 
 
-def _printing_step(time: Signal) -> float:
+def _least_step(time: Signal) -> float:
     """The least step between stamps that differ."""
     steps = np.diff(time)
     return float(np.min(steps[steps > 0.0], initial=np.inf)) if np.any(steps > 0.0) else 0.0
