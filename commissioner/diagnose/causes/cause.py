@@ -155,8 +155,8 @@ class Cause:
     where: ClassVar[frozenset[str]] = frozenset()
     """Sizes that say where it acts and not how much."""
     words: ClassVar[Words]
-    in_service: ClassVar[tuple[str, str]] = ("", "")
-    """Its short name on the service's page, and what to do; empty: the title made of its name."""
+    advice: ClassVar[str] = ""
+    """What a technician's page says beside its size, where it is normal or easily put right."""
     split_by: ClassVar[str]
     decides: ClassVar[str]
     """What settles whether the name is right, in one sentence."""

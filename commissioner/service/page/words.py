@@ -123,9 +123,7 @@ class Words:
     def cause(self, name: str) -> str:
         from commissioner.diagnose.causes import CATALOGUE
 
-        called = CATALOGUE[name].in_service[0] if name in CATALOGUE else ""
-        if not called:
-            called = name.replace("_", " ").capitalize()
+        called = CATALOGUE[name].title if name in CATALOGUE else name.replace("_", " ").capitalize()
         return self._t.gettext(called)
 
     def causes(self, names: Sequence[str]) -> str:
@@ -134,7 +132,7 @@ class Words:
     def cause_advice(self, name: str) -> str:
         from commissioner.diagnose.causes import CATALOGUE
 
-        advice = CATALOGUE[name].in_service[1] if name in CATALOGUE else ""
+        advice = CATALOGUE[name].advice if name in CATALOGUE else ""
         return self._t.gettext(advice) if advice else ""
 
     def size(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:

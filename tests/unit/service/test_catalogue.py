@@ -77,7 +77,7 @@ def names():
     yield from words.SCRIPT_TEXTS
     yield from frame.STEPS
     yield from band.PARTS.values()
-    yield from (text for cause in CATALOGUE.values() for text in cause.in_service if text)
+    yield from (text for cause in CATALOGUE.values() for text in (cause.title, cause.advice) if text)
     yield from (quantity.name for quantity in words.QUANTITIES)
     yield from (scenario.replace("_", " ") for scenario in SCENARIOS)
     yield from ("commissioned", "rejected", "aborted", "faulted", "cut off", "passed", "not passed")

@@ -26,7 +26,6 @@ class DeadTime(LegLoss):
     )
     source = "J. Holtz, J. Quan, IEEE Trans. Ind. Appl. 38(4), 2002; V_dt = T_d f_sw V_dc per leg"
     words = Words("The inverter's dead time takes {size} from every leg", HARMLESS, COMPENSATE, is_normal=True)
-    in_service = (title, LegLoss.in_service[1])
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return self.numbers(LEGS_LINK, setting)

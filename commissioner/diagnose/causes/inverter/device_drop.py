@@ -19,7 +19,6 @@ class DeviceDrop(LegLoss):
     source = "A. R. Munoz, T. A. Lipo, IEEE Trans. Power Electron. 14(2), 1999; slope resistance is part of R_s"
     confounders = (Confounder("dead_time", is_always_tied=True, told_apart_by=at_half_the_frequency, as_one=BOTH),)
     words = Words("The inverter's switches and diodes take {size} from every leg", HARMLESS, COMPENSATE, is_normal=True)
-    in_service = ("Voltage drop of the devices", LegLoss.in_service[1])
     half_over_knee = 0.577
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:

@@ -37,7 +37,7 @@ class LegLoss(Cause):
     form = Form.SHAPED
     split_by = "repeat one segment at half the switching frequency or another link voltage"
     decides = "Repeat one test at half the switching frequency."
-    in_service = ("", "Normal for an inverter. The identification takes it off; nothing to do.")
+    advice = "Normal for an inverter. The identification takes it off; nothing to do."
     half_over_knee = 1.0
     """Of the simulator's curve."""
 

@@ -68,7 +68,7 @@ class IronLoss(Cause):
         "Enter an iron loss only where the drive asks for one.",
         is_normal=True,
     )
-    in_service = ("Iron loss", "Normal.")
+    advice = "Normal."
     in_points = InPoints(
         "loss", (0.6, 2.0), (0.0, 1.0), (1.0, 6.0),
         lambda x, flux, speed: 1.0 - x[0] + x[0] * speed**-0.5 * flux ** x[1], in_table,

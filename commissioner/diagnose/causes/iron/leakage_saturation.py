@@ -51,7 +51,7 @@ class LeakageSaturation(Cause):
         "Use the drive's table for it where there is one; if the current control rings at large current, lower its gain.",
         is_normal=True,
     )
-    in_service = ("Saturation of the leakage path", "Normal in small motors with closed slots.")
+    advice = "Normal in small motors with closed slots."
     in_points = InPoints(
         "leakage", (0.1,), (-0.5,), (5.0,), lambda x, amps, _speed: np.maximum(1.0 + x[0] * amps, 0.1), in_table,
         has_several_currents,

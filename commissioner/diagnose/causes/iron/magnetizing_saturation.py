@@ -50,7 +50,7 @@ class MagnetizingSaturation(Cause):
         "Enter the L_M at rated flux that `commissioner identify` gives, and its curve where the drive has a table for it.",
         is_normal=True,
     )
-    in_service = (title, "Normal. Give the drive its saturation curve if it takes one.")
+    advice = "Normal. Give the drive its saturation curve if it takes one."
     in_points = InPoints(
         "magnetizing", (0.3, 5.0), (0.0, 1.0), (50.0, 14.0), lambda x, flux, _speed: 1.0 + x[0] * flux ** x[1], in_table
     )

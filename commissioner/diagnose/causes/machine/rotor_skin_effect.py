@@ -48,7 +48,7 @@ class RotorSkinEffect(Cause):
         "Do not enter a rotor resistance from a locked-rotor test at mains frequency: it is too high.",
         is_normal=True,
     )
-    in_service = ("Deep bars of the rotor", "Normal in larger motors.")
+    advice = "Normal in larger motors."
     in_points = InPoints(
         "resistance", (0.1,), (-0.5,), (5.0,), lambda x, _amps, speed: np.maximum(1.0 + x[0] * (speed**2 - 1.0), 1e-3),
         in_table, has_several_frequencies,

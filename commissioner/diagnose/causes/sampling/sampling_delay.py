@@ -46,7 +46,7 @@ class SamplingDelay(Cause):
         FINE,
         measurement="Read the current at the step of the command, or correct its time stamps by that.",
     )
-    in_service = ("Delay of sampling", "Normal where it is a part of a sample period.")
+    advice = "Normal where it is a part of a sample period."
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return (

@@ -34,7 +34,7 @@ class SensorGainMismatch(Cause):
         FINE,
         measurement="Send one current through all three sensors in series and calibrate them against each other.",
     )
-    in_service = (title, "Values change with the axis. Beyond 1 %: have the sensors compared.")
+    advice = "Values change with the axis. Beyond 1 %: have the sensors compared."
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return tuple(Term(self.name, PHASES[k], "1", GAIN, k, 1e-3, -0.5, 0.5) for k in range(1, setting.facts.phases))

@@ -77,7 +77,7 @@ class SensorLag(Cause):
     words = Words(
         "The current sensors are slow by {size}", FINE, measurement="Check the filters of the current inputs."
     )
-    in_service = (title, "Normal where it is a part of a sample period.")
+    advice = "Normal where it is a part of a sample period."
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         rippled = FIRST_RIPPLED * setting.facts.sample_period_s

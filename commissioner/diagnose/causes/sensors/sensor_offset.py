@@ -37,7 +37,7 @@ class SensorOffset(Cause):
         "Let the drive calibrate its current sensors at rest, if it can.",
         "Read the three currents with the inverter off, and take that off.",
     )
-    in_service = (title, "Zero them at the drive if it offers that.")
+    advice = "Zero them at the drive if it offers that."
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return tuple(Term(self.name, PHASES[k], "A", OFFSET, k, 1e-3) for k in range(setting.facts.phases))
