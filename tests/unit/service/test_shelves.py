@@ -17,6 +17,7 @@ from commissioner.service.archive import Archive
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.routes.history import trend_of
 from tests.support.archive.synthetic import MACHINE, PLATE, make_run, result_of
+from tests.support.service.markup import without_layout
 
 COPPER_PER_K = 1.0 / (235.0 + 20.0)
 COLD, WARM = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
@@ -83,7 +84,7 @@ def test_where_the_last_run_tells_no_error_the_points_still_stand(tmp_path):
     make_run(tmp_path, last, result=spoilt, origin={"motor": "pump"})
     document = trend_of(parts, "pump")
     assert [point["run"] for point in document["points"]] == [COLD, WARM, last] and document["changes"] == {}
-    said = rendered("shelves/trend.html", "en", document=document, motor="pump")
+    said = without_layout(rendered("shelves/trend.html", "en", document=document, motor="pump"))
     assert "3.716</td>" in said and "3.716 ± 0.009</td>" in said and "σ)" not in said
 
 

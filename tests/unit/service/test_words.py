@@ -20,6 +20,7 @@ from commissioner.run.archive import summary
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import IN_THE_DRIVE, Words
+from tests.support.service.markup import without_layout
 
 
 def size(value, std, unit):
@@ -107,7 +108,7 @@ def test_tunings_agree_only_with_what_they_were_compared_with(plate_low, repeats
             "fewest": FEWEST,
         }
     )
-    said = "".join(template.blocks["main"](context))
+    said = without_layout("".join(template.blocks["main"](context)))
     assert title in said
     assert "raw" not in said
     assert ("0.10\N{NO-BREAK SPACE}%" in said) is (repeats > 1)
