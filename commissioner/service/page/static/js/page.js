@@ -1,7 +1,8 @@
 /* STOP, the band and the line to the service. Nothing on any page is needed for STOP but this file, or no script at all. */
 const $ = (selector) => document.querySelector(selector);
 export const texts = JSON.parse($("#texts").textContent);
-export const say = (message, ...facts) => facts.reduce((text, fact) => text.replace(/%[a-z]/, fact), texts[message] ?? message);
+export const say = (message, ...facts) =>
+  facts.reduce((text, fact) => text.replace(/%[a-z]/, fact), texts[message] ?? message);
 export const language = document.documentElement.lang;
 
 /* numbers: fixed digits, the language's decimal mark, a true minus, a no-break space before the unit */
@@ -9,17 +10,26 @@ export const number = (value, digits, unit = "") => {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const shown = Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value;
   const text = Math.abs(shown).toFixed(digits);
-  return (shown < 0 ? "\u2212" : "") + (language === "de" ? text.replace(".", ",") : text) + (unit ? `\u00a0${unit}` : "");
+  return (
+    (shown < 0 ? "\u2212" : "") + (language === "de" ? text.replace(".", ",") : text) + (unit ? `\u00a0${unit}` : "")
+  );
 };
 
 const root = document.documentElement;
 const place = document.body.dataset;
-const OFFLINE_MS = 1500, RETRY_MS = 500;
-let socket = null, heardAt = performance.now(), wasLive = root.dataset.level === "live" || root.dataset.level === "alarm";
-let isOffline = false, stopPending = 0, lastBand = null;
+const OFFLINE_MS = 1500,
+  RETRY_MS = 500;
+let socket = null,
+  heardAt = performance.now(),
+  wasLive = root.dataset.level === "live" || root.dataset.level === "alarm";
+let isOffline = false,
+  stopPending = 0,
+  lastBand = null;
 const listeners = { band: [], live: [], samples: [], history: [], over: [], control: [], refused: [], offline: [] };
 export const on = (kind, act) => listeners[kind].push(act);
-const tell = (kind, fact) => { for (const act of listeners[kind] ?? []) act(fact); };
+const tell = (kind, fact) => {
+  for (const act of listeners[kind] ?? []) act(fact);
+};
 
 /* ---- the line ---------------------------------------------------------------------------------------------------- */
 function connect() {
@@ -37,7 +47,9 @@ function connect() {
       tell(kind, said[kind]);
     }
   });
-  socket.addEventListener("close", () => { if (!leaving) setTimeout(connect, RETRY_MS); });
+  socket.addEventListener("close", () => {
+    if (!leaving) setTimeout(connect, RETRY_MS);
+  });
 }
 export const send = (fact) => {
   if (socket === null || socket.readyState !== WebSocket.OPEN) return false;
@@ -45,19 +57,36 @@ export const send = (fact) => {
   return true;
 };
 let leaving = false;
-addEventListener("pagehide", () => { leaving = true; });
-addEventListener("pageshow", (event) => { leaving = false; if (event.persisted) location.reload(); });
+addEventListener("pagehide", () => {
+  leaving = true;
+});
+addEventListener("pageshow", (event) => {
+  leaving = false;
+  if (event.persisted) location.reload();
+});
 connect();
-setInterval(() => { if (performance.now() - heardAt > OFFLINE_MS) offline(); }, 250);
+setInterval(() => {
+  if (performance.now() - heardAt > OFFLINE_MS) offline();
+}, 250);
 
 /* ---- the band ---------------------------------------------------------------------------------------------------- */
-const put = (id, text) => { const node = document.getElementById(id); if (node.textContent !== text) node.textContent = text; };
+const put = (id, text) => {
+  const node = document.getElementById(id);
+  if (node.textContent !== text) node.textContent = text;
+};
 function showBand(band) {
-  const changed = lastBand === null ? root.dataset.level !== band.level || $("#big").textContent !== band.big : lastBand.level !== band.level || lastBand.big !== band.big;
+  const changed =
+    lastBand === null
+      ? root.dataset.level !== band.level || $("#big").textContent !== band.big
+      : lastBand.level !== band.level || lastBand.big !== band.big;
   lastBand = band;
   level(band.level);
-  put("big", band.big); put("small", band.small); put("drive", band.drive); put("driveline", band.drive_line);
-  put("control", band.control); put("controlline", band.control_line);
+  put("big", band.big);
+  put("small", band.small);
+  put("drive", band.drive);
+  put("driveline", band.drive_line);
+  put("control", band.control);
+  put("controlline", band.control_line);
   if (performance.now() > stopPending) put("stopsub", band.stop);
   const field = $("#stopform [name=run]");
   field.value = band.run;
@@ -78,15 +107,24 @@ function offline() {
     isOffline = true;
     level(wasLive ? "alarm" : "unknown");
     put("big", say(wasLive ? "TAKE THE MOTOR AS LIVE" : "State of the motor not known"));
-    put("small", say(wasLive ? "This page has lost the service. The motor was energised" : "This page has lost the service"));
-    put("control", say("not known")); put("controlline", say("no service"));
+    put(
+      "small",
+      say(wasLive ? "This page has lost the service. The motor was energised" : "This page has lost the service"),
+    );
+    put("control", say("not known"));
+    put("controlline", say("no service"));
     put("say", `${$("#big").textContent}. ${$("#small").textContent}`);
     tell("offline", true);
   }
   if (performance.now() > stopPending) put("stopsub", say("cannot be sent: use the emergency stop")); // not over what a STOP was answered
   put("driveline", say("last word %s ago", number((performance.now() - heardAt) / 1000, 1, "s")));
 }
-function online() { isOffline = false; lastBand = null; stopPending = 0; tell("offline", false); }
+function online() {
+  isOffline = false;
+  lastBand = null;
+  stopPending = 0;
+  tell("offline", false);
+}
 
 /* a run that has moved on: the same address shows its next page; the band and STOP stay where they are */
 const OVER = new Set(["ended", "diagnosing"]);
@@ -99,7 +137,11 @@ async function follow(phase) {
   isChanging = true;
   try {
     if (!(await renew((next) => !(next.querySelector("#livedata") && $("#livedata"))))) place.phase = before;
-  } catch { place.phase = before; } finally { isChanging = false; }
+  } catch {
+    place.phase = before;
+  } finally {
+    isChanging = false;
+  }
 }
 /* the work of this page as the service shows it now, where `isWanted` says so of it */
 export async function renew(isWanted = () => true) {
@@ -108,7 +150,8 @@ export async function renew(isWanted = () => true) {
   const next = new DOMParser().parseFromString(await answer.text(), "text/html");
   if (!isWanted(next)) return false;
   for (const selector of ["#main", "#steps"]) {
-    const fresh = next.querySelector(selector), old = $(selector);
+    const fresh = next.querySelector(selector),
+      old = $(selector);
     if (fresh && old) old.replaceWith(fresh);
   }
   document.title = next.title;
@@ -116,10 +159,17 @@ export async function renew(isWanted = () => true) {
   scrollTo(0, 0);
   return true;
 }
-on("over", () => { place.phase = "…"; follow("ended"); });
+on("over", () => {
+  place.phase = "…";
+  follow("ended");
+});
 
 /* ---- STOP: on the press, at once, never asked back, never disabled; twice is harmless ---------------------------------- */
-function note(text, seconds = 4) { stopPending = performance.now() + 1000 * seconds; put("stopsub", text); put("say", text); }
+function note(text, seconds = 4) {
+  stopPending = performance.now() + 1000 * seconds;
+  put("stopsub", text);
+  put("say", text);
+}
 export function stop(how) {
   note(say("sending …"), 6);
   if (!isOffline && send({ stop: how, run: place.run })) return;
@@ -128,30 +178,68 @@ export function stop(how) {
 async function post(how) {
   const url = place.run ? `/api/runs/${encodeURIComponent(place.run)}/stop` : "/api/stop";
   try {
-    const answer = await fetch(url, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ reason: how }), keepalive: true });
+    const answer = await fetch(url, {
+      method: "POST",
+      headers: { "content-type": "application/json" },
+      body: JSON.stringify({ reason: how }),
+      keepalive: true,
+    });
     const said = await answer.json();
-    if (answer.ok) stopped(said.stopped ?? [said]); else note(say("sent, not confirmed: emergency stop"), 10);
-  } catch { note(say(isOffline || wasLive ? "cannot be sent: use the emergency stop" : "not sent: use the emergency stop"), 10); }
+    if (answer.ok) stopped(said.stopped ?? [said]);
+    else note(say("sent, not confirmed: emergency stop"), 10);
+  } catch {
+    note(say(isOffline || wasLive ? "cannot be sent: use the emergency stop" : "not sent: use the emergency stop"), 10);
+  }
 }
 function stopped(runs) {
   if (runs.some((run) => !run.zero_volts)) note(say("sent, not confirmed: emergency stop"), 10);
-  else if (runs.some((run) => run.after_s > 0)) note(say("sent; zero volts confirmed after %s", number(Math.max(...runs.map((run) => run.after_s)), 2, "s")), 5);
+  else if (runs.some((run) => run.after_s > 0))
+    note(say("sent; zero volts confirmed after %s", number(Math.max(...runs.map((run) => run.after_s)), 2, "s")), 5);
   else note(say("sent; output was off already"), 3);
 }
-$("#stop").addEventListener("pointerdown", (event) => { if (event.button === 0) stop("STOP"); });
-$("#stop").addEventListener("click", (event) => { event.preventDefault(); if (event.detail === 0) stop("STOP"); });
-$("#stopform").addEventListener("submit", (event) => { event.preventDefault(); });
-document.addEventListener("keydown", (event) => {
-  if (event.key === "Escape") { event.preventDefault(); stop("Esc"); return; }
-  const target = event.target;
-  const typing = target.isContentEditable || (/^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName) && !/^(checkbox|radio|button|submit)$/.test(target.type));
-  if (event.key === " " && !event.repeat && !typing && (root.dataset.level === "live" || root.dataset.level === "alarm")) { event.preventDefault(); stop("Space"); }
-}, true);
+$("#stop").addEventListener("pointerdown", (event) => {
+  if (event.button === 0) stop("STOP");
+});
+$("#stop").addEventListener("click", (event) => {
+  event.preventDefault();
+  if (event.detail === 0) stop("STOP");
+});
+$("#stopform").addEventListener("submit", (event) => {
+  event.preventDefault();
+});
+document.addEventListener(
+  "keydown",
+  (event) => {
+    if (event.key === "Escape") {
+      event.preventDefault();
+      stop("Esc");
+      return;
+    }
+    const target = event.target;
+    const typing =
+      target.isContentEditable ||
+      (/^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName) && !/^(checkbox|radio|button|submit)$/.test(target.type));
+    if (
+      event.key === " " &&
+      !event.repeat &&
+      !typing &&
+      (root.dataset.level === "live" || root.dataset.level === "alarm")
+    ) {
+      event.preventDefault();
+      stop("Space");
+    }
+  },
+  true,
+);
 
 /* ---- small helpers of forms -------------------------------------------------------------------------------------- */
 document.addEventListener("submit", (event) => {
   const busy = event.target.dataset?.busy;
-  if (busy) { const button = event.target.querySelector("button"); button.textContent = busy; put("say", busy); }
+  if (busy) {
+    const button = event.target.querySelector("button");
+    button.textContent = busy;
+    put("say", busy);
+  }
 });
 if ($("#plate")) import("./plate.js");
 if ($("#drop")) import("./drop.js");

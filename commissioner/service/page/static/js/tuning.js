@@ -1,7 +1,8 @@
 /* A drive's own tuning: the same page anew when a repeat is done or the person at the drive is asked something. */
 import { on, renew } from "./page.js";
 
-let newest = null, isRenewing = false;
+let newest = null,
+  isRenewing = false;
 const isOld = () => {
   const shown = document.querySelector("#tuning")?.dataset.shown;
   return shown !== undefined && newest !== null && shown !== `${newest.done} ${newest.question ?? ""}`;
@@ -10,5 +11,9 @@ on("live", async (live) => {
   newest = live.tuning;
   if (isRenewing) return;
   isRenewing = true;
-  try { while (isOld() && (await renew())) await new Promise((done) => setTimeout(done, 200)); } finally { isRenewing = false; }
+  try {
+    while (isOld() && (await renew())) await new Promise((done) => setTimeout(done, 200));
+  } finally {
+    isRenewing = false;
+  }
 });
