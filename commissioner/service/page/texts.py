@@ -119,7 +119,7 @@ class Texts:
         """What stood in a sentence's gap: words that are known, or as it was, its numbers with this language's mark. An address, a
         version of three parts and a file's name are no number."""
         known = self._catalogue.messages
-        said = known.get(text) or ", ".join(known.get(word, word) for word in text.split(", "))
+        said = known.get(text) or "".join(known.get(word, word) for word in re.split("(, | or )", text))
         said = self.tell(text) if said == text and " " in text else said  # a sentence within a sentence
         said = _BOUND.sub(lambda side: self.gettext(side[1]) + " ", said)
         return (

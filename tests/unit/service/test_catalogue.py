@@ -78,6 +78,8 @@ def names():
     yield from frame.STEPS
     yield from band.PARTS.values()
     yield from (text for cause in CATALOGUE.values() for text in (cause.title, cause.advice) if text)
+    yield from (name.replace("_", " ") for name in CATALOGUE)
+    yield " or "
     yield from (quantity.name for quantity in words.QUANTITIES)
     yield from (scenario.replace("_", " ") for scenario in SCENARIOS)
     yield from ("commissioned", "rejected", "aborted", "faulted", "cut off", "passed", "not passed")
