@@ -94,7 +94,9 @@ class Feed:
         except OSError:
             return False
         for k, line in enumerate(lines):
-            if k == 0 or line["kind"] == "axis_finished":  # the following blocks are another test's, where much is read at once
+            if (
+                k == 0 or line["kind"] == "axis_finished"
+            ):  # the following blocks are another test's, where much is read at once
                 self._show_samples(_blocks_before(line))
             self.state.take(line)
             self._publish(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
