@@ -18,7 +18,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except BaseException as error:
-        if isinstance(error, OSError) and error.errno and error.filename in (None, str(temporary)):
+        if isinstance(error, OSError) and error.errno and str(error.filename or temporary) == str(temporary):
             error.filename, error.strerror = str(path), os.strerror(error.errno)  # the name that the person gave
         temporary.unlink(missing_ok=True)
         raise

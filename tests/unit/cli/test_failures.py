@@ -1,6 +1,7 @@
 """Every verb's failure is one sentence with step, value, limit and remedy, one document with --json, and its exit code."""
 
 import contextlib
+import errno
 import io
 import json
 import os
@@ -84,6 +85,15 @@ def test_whatever_is_raised_is_one_document_with_its_exit_code(capsys, error, co
 def test_a_value_is_named_also_where_none_was_seen(capsys, error, value):
     _, document = leave(capsys, of=raising(error))
     assert value in document["error"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("number", "remedy"),
+    [(errno.EROFS, "make its disk writable"), (errno.ENOSPC, "make room"), (errno.EACCES, "give another")],
+)
+def test_the_remedy_of_a_file_in_the_way_is_that_of_its_kind(capsys, number, remedy):
+    _, document = leave(capsys, of=raising(OSError(number, os.strerror(number), "/somewhere/file")))
+    assert document["error"]["remedy"].startswith(remedy) and document["error"]["value"] == "/somewhere/file"
 
 
 @pytest.mark.skipif(not pathlib.Path("/dev/full").exists(), reason="no /dev/full here")
