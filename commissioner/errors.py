@@ -25,6 +25,7 @@ the limit or expectation it broke, and the remedy.
 from __future__ import annotations
 
 import errno
+import math
 import reprlib
 from typing import NotRequired
 
@@ -66,8 +67,8 @@ class CommissionerError(Exception):
         super().__init__(what)
         self.what = what
         self.step = step
-        self.value = NOTHING if value is None else value
-        self.limit = limit
+        self.value = NOTHING if value is None else _in_words(value)
+        self.limit = _in_words(limit)
         self.remedy = remedy
         self.unit = unit
 
@@ -107,6 +108,11 @@ class ConfigurationError(UsageError):
         )
         self.file = file
         self.key = key
+
+
+def _in_words(value: object) -> object:
+    """A number that JSON cannot say becomes its word."""
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _repair(value: object, expected: str) -> str:

@@ -111,8 +111,8 @@ def _unanswered(arguments: Sequence[str]) -> CommissionerError:
 def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:
     """A file or folder that is in the way, closed to us, or on a disk that is full or failing."""
     kind = DiskRefused if failure.errno in OF_DISK else UsageError
-    has_room = kind is UsageError or failure.errno == errno.EROFS
-    remedy = "give another file or folder" if has_room else "make room on the disk, or use another one"
+    otherwise = "make room on the disk, or use another one" if kind is DiskRefused else "give another file or folder"
+    remedy = "make its disk writable, or copy it to one that is" if failure.errno == errno.EROFS else otherwise
     return kind(
         f"{failure.filename or 'a file'} cannot be used: {failure.strerror or failure}", step=_verb(arguments),
         value=failure.filename or shown_call(arguments), limit="a file or folder that this user may read or write", remedy=remedy,

@@ -75,7 +75,7 @@ def carry_out(request: StudyRequest, observe: Callable[[CaseEnded], None] = lamb
             rows.add(row)
             observe(CaseEnded(done, len(cases), str(row["outcome"])))
     finally:
-        table = rows.close() if rows.ended else None
+        table = rows.close()
     ordered = [rows.ended[number] for number in sorted(rows.ended)]
     seen, report = summarise(ordered), request.out / PAGE
     write_text(report, page(ordered, seen, f"Study {request.file.name}"))

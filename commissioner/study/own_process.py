@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from commissioner.errors import LinkUnreachable
+from commissioner.errors import LinkUnreachable, UsageError
 
 START_S, LONG_S = 900.0, 10.0
 """The simulator compiles its kernels at the first start, minutes on a busy computer; later starts take about a second."""
@@ -49,6 +49,8 @@ def simulated_inverter(
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+        if process.stderr is not None:
+            process.stderr.close()
 
 
 def _port(process: subprocess.Popen[str], wait: Callable[[], None]) -> int:
@@ -59,8 +61,9 @@ def _port(process: subprocess.Popen[str], wait: Callable[[], None]) -> int:
     stdout = process.stdout
 
     def collect() -> None:
-        for line in stdout:
-            lines.put(line)
+        with stdout:
+            for line in stdout:
+                lines.put(line)
 
     threading.Thread(target=collect, daemon=True).start()
     began, is_long = time.monotonic(), False
@@ -77,6 +80,11 @@ def _port(process: subprocess.Popen[str], wait: Callable[[], None]) -> int:
         if line.startswith("listening tcp "):
             return int(line.rsplit(":", 1)[1])
     said = "" if process.poll() is None else process.stderr.read().strip()
+    if process.poll() == UsageError.exit_code:
+        raise UsageError(
+            "the simulated inverter cannot be started so", step="start simulator", value=said.splitlines()[-1] if said else "no answer",
+            limit="a scenario, speed and seed that it takes", remedy="`python -m sim --list` names the scenarios; the speed is 1, N or max",
+        )  # fmt: skip
     raise LinkUnreachable(
         "the simulated inverter did not start",
         step="start simulator",

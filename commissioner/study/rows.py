@@ -87,12 +87,16 @@ class Rows:
             self._file.write(json.dumps(plain(row), allow_nan=False) + "\n")
             self._file.flush()
 
-    def close(self) -> Path:
-        """The table, in the order of cases."""
+    def close(self) -> Path | None:
+        """The table, in the order of cases; None where no case has ended: the same call may then be made again."""
+        self._file.close()
+        if not self.ended:
+            for name in (ENDED, ASKED):
+                (self.folder / name).unlink(missing_ok=True)
+            return None
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        self._file.close()
         target = self.folder / TABLE
         ordered = [self.ended[case] for case in sorted(self.ended)]
         names = dict.fromkeys(name for row in ordered for name in row)  # Arrow would take the first row's alone

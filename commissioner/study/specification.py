@@ -23,9 +23,11 @@ class Specification(FileTable):
 
     kind: Literal["commission", "identify", "diagnose", "monitor"]
     runs: Annotated[int, Field(ge=1, le=MOST_CASES, description="number of commissionings, 1 ... 1e6")] = 1
-    motors: Annotated[list[str], Field(min_length=1)] | Literal["all"] = "all"
+    motors: Annotated[
+        Annotated[list[str], Field(min_length=1)] | Literal["all"], Field(description='names or files, or "all"')
+    ] = "all"
     spread: Annotated[float, Field(ge=0, le=0.5, description="relative variation of the machines, 0 ... 0.5")] = 0.0
-    effects: list[str] | Literal["none", "any"] = "none"
+    effects: Annotated[list[str] | Literal["none", "any"], Field(description='names, or "none" or "any"')] = "none"
     noise_a: Annotated[float, Field(ge=0, le=100, description="amperes rms, 0 ... 100")] | None = None
     links: Literal["memory", "tcp"] = "memory"
     faults: list[str] = Field(default=[])
@@ -57,6 +59,10 @@ def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Ca
     if study.kind != "commission":
         return _of_files(study, path)
     names = list(motors) if study.motors == "all" else [_beside(name, path, motors) for name in study.motors]
+    if study.files:
+        raise ConfigurationError(
+            file=str(path), key="files", value=study.files, expected='kind = "identify", "diagnose" or "monitor": a commissioning reads no recording',
+        )  # fmt: skip
     plates = {name: _plate(name, path, motors) for name in names}
     effects = (study.effects,) if isinstance(study.effects, str) else tuple(study.effects)
     seeds = np.random.default_rng(study.seed).integers(0, 2**31, study.runs)

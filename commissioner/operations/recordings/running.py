@@ -16,8 +16,9 @@ from commissioner.errors import ConfigurationError, DataRefused
 from commissioner.identify.contract import RunningDocument
 from commissioner.motor.nameplate import Nameplate
 from commissioner.operations.events import GoOn, Observe
+from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
-from commissioner.recordings.table import Table, read_table, to_running, write_table
+from commissioner.recordings.table import Table, to_running, write_table
 from commissioner.recordings.whole import write_texts
 from commissioner.records import RunningRecording
 from commissioner.running.diagnosis import Diagnosis
@@ -123,7 +124,7 @@ def played(
         raise ConfigurationError(
             file=source, key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
         ) from error
-    recording = to_running(read_table(like)) if like is not None else None
+    recording = read_running(like) if like is not None else None
     period = recording.sample_period_s if recording is not None else float(document["sample_period_s"])
     columns = play(machine, scales, plate, period, recording, document.get("scenario", {}), noise_a, seed)
     if not all(np.isfinite(x).all() for x in columns.values()):

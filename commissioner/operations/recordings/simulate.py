@@ -23,10 +23,12 @@ from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.ranges import require_range
 from commissioner.operations.recordings import catalogue
+from commissioner.operations.recordings.intake import standstill
 from commissioner.operations.recordings.running import is_running_model, played
 from commissioner.paths import MOTOR, no_file
 from commissioner.recordings.catalogue.reading import sheet_of
-from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
+from commissioner.recordings.importers import contract_table
+from commissioner.recordings.table import check_ending, write_table
 from commissioner.settings import load_motor, read_toml
 
 MAX_BYTES = 5_000_000
@@ -93,11 +95,12 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
         return Simulated(str(request.out), samples, 1, names, _remarks(request))
     motor = _motor(request.model, request.plain)
     facts = _facts(motor.plate)
+    said: list[str] = []
     if request.like is None:
         plan = playback.default_plan(request.axes_deg)
         segments = playback.command(motor.model, facts, plan, request.seconds, request.seed)
     else:
-        segments, facts = _command_of(request.like, facts)
+        segments, facts, said = _command_of(request.like, facts)
     observe(Began("playing"))
     columns = _played(
         request.model,
@@ -108,7 +111,9 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
     keys = {k: v for k, v in motor.plate.items() if isinstance(v, int | float | str) and k not in ("name", "scenario")}
     write_table(request.out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
     effects = tuple(sorted({t.effect for t in motor.model.terms if t.effect}))
-    return Simulated(str(request.out), int(columns["time_s"].shape[0]), len(segments), effects, _remarks(request))
+    return Simulated(
+        str(request.out), int(columns["time_s"].shape[0]), len(segments), effects, (*said, *_remarks(request))
+    )
 
 
 def _remarks(request: SimulateRequest) -> tuple[str, ...]:
@@ -204,7 +209,9 @@ def _facts(plate: Mapping[str, Any]) -> Facts:
     return Facts(period, current, power, flux, current, None, None, 3, dict(plate))
 
 
-def _command_of(path: Path, facts: Facts) -> tuple[Command, Facts]:
-    record, _ = prepare([to_standstill(read_table(path))])
+def _command_of(path: Path, facts: Facts) -> tuple[Command, Facts, list[str]]:
+    """The command of a recording of any form that `identify` reads, at its rate, and what its reader says."""
+    recordings, said = standstill([contract_table(path)], None)
+    record, _ = prepare(recordings)
     segments: Command = [(s.axis_deg, s.voltage_axis_v) for s in record.segments]
-    return segments, replace(facts, sample_period_s=record.facts.sample_period_s)
+    return segments, replace(facts, sample_period_s=record.facts.sample_period_s), said

@@ -74,19 +74,20 @@ def read_blocks(path: Path, damage: list[BlockDamage] | None = None) -> Iterator
     yield from _walk(data, [] if damage is None else damage)
 
 
-def follow_blocks(path: Path, offset: int, most: int) -> tuple[list[Placed], int]:
-    """The whole blocks from byte `offset` on, `most` at a time, and where to go on: a frame that is still being written is left for later."""
+def follow_blocks(path: Path, offset: int, most: int) -> list[tuple[int, Placed]]:
+    """The whole blocks from byte `offset` on, `most` at a time, each with the byte where it ends and the next one begins: a frame that
+    is still being written is left for later."""
     if not path.is_file():
-        return [], offset
+        return []
     with path.open("rb") as file:
         file.seek(offset)
         data = file.read()
-    found: list[Placed] = []
+    found: list[tuple[int, Placed]] = []
     at = 0
     while len(found) < most and (payload := _payload(data, at)) is not None:
-        found.append(_decode(payload))
         at += _FRAME.size + len(payload)
-    return found, offset + at
+        found.append((offset + at, _decode(payload)))
+    return found
 
 
 def _walk(data: bytes, damage: list[BlockDamage]) -> Iterator[Placed]:

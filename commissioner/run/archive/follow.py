@@ -35,7 +35,8 @@ class BlocksFollower:
     def __init__(self, path: Path, offset: int = 0) -> None:
         self._path, self.offset = path, offset
 
-    def new(self, most: int = 10_000) -> list[Placed]:
-        """The whole (segment, block) pairs since the last call, `most` at a time."""
-        blocks, self.offset = follow_blocks(self._path, self.offset, most)
+    def new(self, most: int = 10_000) -> list[tuple[int, Placed]]:
+        """The whole (segment, block) pairs since the last call, `most` at a time, each with the byte of the file where it ends."""
+        blocks = follow_blocks(self._path, self.offset, most)
+        self.offset = blocks[-1][0] if blocks else self.offset
         return blocks

@@ -35,9 +35,11 @@ async def _stream(parts: Parts, feed: Feed, after: int) -> AsyncIterator[bytes]:
         with feed.watch(after) as watcher:
             while not watcher.is_lost:
                 taking = asyncio.create_task(watcher.take())
-                await asyncio.wait([taking, closing], return_when=asyncio.FIRST_COMPLETED)
+                try:
+                    await asyncio.wait([taking, closing], return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    taking.cancel()  # where the reader has gone; one that is done stays so
                 if closing.done():
-                    taking.cancel()
                     return
                 taken = taking.result()
                 yield b"".join(map(_encoded, taken))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from commissioner.encoding import JsonObject
 from commissioner.run.archive.blocks import Placed
 from commissioner.run.archive.follow import BlocksFollower, JournalFollower
 from commissioner.service.runs.live import live_document
@@ -67,7 +69,7 @@ class Feed:
         self._journal = JournalFollower(folder / "journal.jsonl")
         self._blocks = BlocksFollower(folder / "blocks.bin")
         self._envelope = Envelope()
-        self._held: list[Placed] = []
+        self._held: list[tuple[int, Placed]] = []
         self._shown_s = 0.0
         self._watchers: set[Watcher] = set()
         self.is_closed = self.is_news = False
@@ -86,25 +88,29 @@ class Feed:
     def poll(self) -> bool:
         """Read what is new; whether there was anything. What the system does not let be read now is read later: no STOP waits for it."""
         try:
-            blocks = self._blocks.new(500)  # before the journal: a block belongs to the state it was taken in
+            blocks = self._blocks.new()  # before the journal: a block belongs to the state it was taken in
             self._held += blocks
             lines = self._journal.new()
         except OSError:
             return False
-        if lines or not blocks or time.monotonic() - self._shown_s > TOGETHER_S:
-            self._show_samples()
-        for line in lines:
+        for k, line in enumerate(lines):
+            # where much is read at once, the blocks behind a finished axis are another test's
+            if k == 0 or line["kind"] == "axis_finished":
+                self._show_samples(_blocks_before(line))
             self.state.take(line)
             self._publish(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
+        if lines or not blocks or time.monotonic() - self._shown_s > TOGETHER_S:
+            self._show_samples()
         if lines or blocks:
             self.heard_s = time.monotonic()
             self.is_news = True
         return bool(lines or blocks)
 
-    def _show_samples(self) -> None:
-        """What was read since the last time, in one piece."""
+    def _show_samples(self, end: float = math.inf) -> None:
+        """What was read since the last time, up to the byte `end` of the blocks, in one piece."""
         before, self._shown_s = self._envelope.energised_s, time.monotonic()
-        events, self._held = self._envelope.of(self._held), []
+        events = self._envelope.of([block for at, block in self._held if at <= end])
+        self._held = [held for held in self._held if held[0] > end]
         if events:
             self.state.energised(self._envelope.energised_s - before)
             self.state.current_high_a = max(
@@ -150,6 +156,14 @@ class Feed:
         for watcher in self._watchers:
             if message is None or message.event == "samples" or watcher.is_page == (message.event == "live"):
                 watcher.send(message)
+
+
+def _blocks_before(line: JsonObject) -> float:
+    """How many bytes of blocks stood when the record was written; all, where another version or person wrote it without."""
+    match line.get("blocks"):
+        case [int() as size, *_]:
+            return size
+    return math.inf
 
 
 def whole(folder: Path) -> Feed:

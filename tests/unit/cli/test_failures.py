@@ -1,6 +1,7 @@
 """Every verb's failure is one sentence with step, value, limit and remedy, one document with --json, and its exit code."""
 
 import contextlib
+import errno
 import io
 import json
 import os
@@ -18,7 +19,7 @@ from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
 from commissioner.cli.screens import screen
 from commissioner.cli.signals import let_end
-from commissioner.errors import ConfigurationError, DataRefused, DriveFault
+from commissioner.errors import ConfigurationError, DataRefused, DriveFault, UsageError
 from commissioner.link.files.drive_file import DRIVES_FOLDER
 from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND, call
@@ -78,11 +79,21 @@ def test_whatever_is_raised_is_one_document_with_its_exit_code(capsys, error, co
     [
         (OSError(27, "File too large"), "--json"),
         (ConfigurationError(file="a.toml", key="files", value=None, expected="a pattern"), "nothing"),
+        (UsageError("no number", step="command line", value=float("nan"), limit="0 ... 1", remedy="give one"), "nan"),
     ],
 )
 def test_a_value_is_named_also_where_none_was_seen(capsys, error, value):
     _, document = leave(capsys, of=raising(error))
     assert value in document["error"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("number", "remedy"),
+    [(errno.EROFS, "make its disk writable"), (errno.ENOSPC, "make room"), (errno.EACCES, "give another")],
+)
+def test_the_remedy_of_a_file_in_the_way_is_that_of_its_kind(capsys, number, remedy):
+    _, document = leave(capsys, of=raising(OSError(number, os.strerror(number), "/somewhere/file")))
+    assert document["error"]["remedy"].startswith(remedy) and document["error"]["value"] == "/somewhere/file"
 
 
 @pytest.mark.skipif(not pathlib.Path("/dev/full").exists(), reason="no /dev/full here")
@@ -135,6 +146,8 @@ def test_who_stops_a_verb_is_told_how_it_goes_on(verb, goes_on):
         ("simulate", "motor_2kw2", "--out", "x.csv", "--seconds", "-1"),
         ("simulate", "motor_2kw2", "--out", "x.csv", "--seconds", "1e9"),
         ("simulate", "motor_2kw2", "--out", "x.csv", "--axes", "nan"),
+        ("demo", "--scenario", "nowhere"),
+        ("demo", "--speed", "fast"),
         ("identify", "x.csv", "--write-back"),
         ("identify", "x.csv", "--write-back", "--drive", "tcp://127.0.0.1:1", "--profile", "danfoss_fc302"),
     ],
@@ -344,6 +357,24 @@ def test_a_drive_with_a_test_mode_can_be_played_another_cannot(capsys, tmp_path)
     assert [code for code, _ in played] == [0, 0, 0] and len({done["samples"] for _, done in played}) == 1
     code, refused = leave(capsys, "simulate", "danfoss_fc302", "--out", tmp_path / "y.csv")
     assert (code, refused["error"]["limit"]) == (2, "a drive with the capability `excite`, or a motor")
+
+
+@pytest.mark.parametrize("name", ["x.csv", "x.csv.gz", "x.parquet"])
+def test_a_file_that_cannot_be_written_is_named_as_it_was_given(capsys, tmp_path, name):
+    out = tmp_path / "no_folder" / name
+    code, refused = leave(capsys, "simulate", "motor_2kw2", "--seconds", "0.2", "--out", out)
+    assert (code, refused["error"]["value"]) == (2, str(out)) and ".part" not in refused["reason"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_the_command_is_taken_of_whatever_identify_reads(capsys, tmp_path, encoding):
+    model = ("simulate", "motor_2kw2", "--seconds", "0.2", "--axes", "0")
+    leave(capsys, *model, "--out", tmp_path / "first.csv")
+    contract = (tmp_path / "first.csv").read_text("utf-8")
+    foreign = contract.replace(",", ";").replace(".", ",").replace("time_s", "Zeit [s]")
+    (tmp_path / "foreign.csv").write_text(foreign, encoding=encoding)
+    code, done = leave(capsys, *model, "--like", tmp_path / "foreign.csv", "--out", tmp_path / "again.csv")
+    assert code == 0 and (tmp_path / "again.csv").read_text("utf-8") == contract, done
 
 
 def test_a_question_that_nobody_can_answer_says_how_to_answer_it(monkeypatch, capsys):

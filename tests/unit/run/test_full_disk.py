@@ -226,6 +226,6 @@ def test_a_document_that_the_disk_does_not_take_leaves_nothing(folder, monkeypat
 
     monkeypatch.setattr(os, "fsync", full)
     before = sorted(path.name for path in folder.path.iterdir())
-    with pytest.raises(OSError, match="no space left"):
+    with pytest.raises(OSError, match="No space left"):
         folder.save("result.json", {"outcome": "commissioned"})
     assert sorted(path.name for path in folder.path.iterdir()) == before

@@ -66,6 +66,7 @@ def test_the_same_file_gives_the_same_cases_and_every_motor_its_turn(tmp_path):
         ('kind = "commission"\nspread = 2.0', "spread"),
         ('kind = "commission"\nmoters = "all"', "moters"),
         ('kind = "commission"\nmotors = ["nobody"]', "motors"),
+        ('kind = "commission"\nfiles = "*.csv"', "files"),
         ('kind = "identify"', "files"),
         ('kind = "identify"\nfiles = "*.nothing"', "files"),
         ('kind = "commission"\nnoise_a = nan', "noise_a"),
@@ -104,6 +105,13 @@ def test_rows_of_another_study_are_never_mixed(tmp_path):
     with pytest.raises(UsageError) as refused:
         Rows(tmp_path, {"seed": 1}, resume=False)
     assert "--resume" in refused.value.remedy
+
+
+def test_a_study_that_ended_before_its_first_case_is_begun_again_by_the_same_call(tmp_path):
+    assert Rows(tmp_path, {"seed": 1}, resume=False).close() is None
+    rows = Rows(tmp_path, {"seed": 2}, resume=False)
+    rows.add({"case": 0, "outcome": "x"})
+    assert rows.close() == tmp_path / "cases.parquet"
 
 
 def row(case, outcome="commissioned", off=0.0, **more):
