@@ -28,7 +28,7 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.archive.summary import RunSummary
-from commissioner.run.archive.verify import Verified
+from commissioner.run.archive.verify import Verified, refuse_damage
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -123,6 +123,7 @@ def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | No
     another drive. The run's journal says so before and after. `key`: of a sealed folder.
     """
     ready, circuit = _ready(run, url, key), _circuit(run)
+    refuse_damage(ready.folder, ready.verified, STEP, "blocks.bin")  # what is lost of the samples proves no result
     prove_verdict(ready.folder, ready.verified, STEP)
     _check_bounds(circuit, ready.plate)
     address = parse_url(ready.url)

@@ -222,6 +222,17 @@ def test_a_result_that_its_samples_do_not_lead_to_is_not_written(fresh, tmp_path
         assert refusal.value.limit == 3.1
 
 
+def test_a_result_whose_samples_are_lost_is_not_written(fresh, tmp_path, monkeypatch):
+    folder = tmp_path / fresh.name
+    shutil.copytree(fresh, folder)
+    with closing(RunFolder(folder)) as archive:
+        archive.journal("snapshot_restored", {})
+    (folder / "blocks.bin").unlink()
+    monkeypatch.setattr(write_accepted, "open_port", None)
+    with pytest.raises(DataRefused, match=r"blocks\.bin is not as the run left it"):
+        write_accepted.write_accepted(summarise(folder), None, "token")
+
+
 def test_a_changed_end_is_reported(fresh, tmp_path):
     def change(line):
         if line["kind"] == "run_ended":
