@@ -26,6 +26,7 @@ INTACT, UNVERIFIED, CUT_OFF, DAMAGED = "intact", "unverified", "cut off", "damag
 DECIDES = ("journal.jsonl", "snapshot.json", "request.json", "result.json", SUMMARY)
 """What a restore rests on; of a damaged sample or page it only speaks."""
 PAGE = "report.html"
+NO_SEAL = "no seal: whoever could write the folder could have made it all"
 
 
 @dataclass(frozen=True)
@@ -271,7 +272,9 @@ def _seal(closed: list[Record], key: bytes | None) -> tuple[str, list[Loss]]:
     if key is None:
         return ("sealed with a key, not checked" if sealed else "none"), []
     if not sealed:
-        return "none", [Loss("journal.jsonl", None, "no seal: whoever could write the folder could have made it all")]
+        return "none", [
+            Loss("journal.jsonl", None, NO_SEAL if closed else f"{NO_SEAL}; a run that was cut off never got one")
+        ]
     last = sealed[-1]
     if not is_sealed_by(key, last.get("previous"), last["record"]):
         return "wrong", [Loss("journal.jsonl", last["n"], "the seal is not of this key, or what it covers was changed")]

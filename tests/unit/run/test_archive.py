@@ -24,11 +24,13 @@ from commissioner.run.archive import report
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder, write_recording
+from commissioner.run.archive.follow import JournalFollower
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.seal import read_key
 from commissioner.run.archive.summary import summarise
 from commissioner.run.archive.verify import verify
 from commissioner.service.archive import Archive
+from commissioner.service.runs.others import request_of
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
@@ -252,6 +254,20 @@ def test_samples_are_not_exported_past_a_damaged_journal(tmp_path):
     journal.write_text(journal.read_text("utf-8").replace("anna", "bert"), "utf-8")
     with pytest.raises(DataRefused, match=r"journal\.jsonl is not as the run left it"):
         export_run(tmp_path, run, tmp_path / "out.csv")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without named pipes")
+def test_a_pipe_in_a_files_place_is_not_waited_for(tmp_path):
+    """The service follows what lies in its archive: one such folder stopped it for good, also for SIGTERM."""
+    for name in ("journal.jsonl", "request.json"):
+        os.mkfifo(tmp_path / name)
+    assert JournalFollower(tmp_path / "journal.jsonl").new() == []
+    assert request_of(tmp_path) == {}
+
+
+def test_a_request_that_is_no_text_is_none(tmp_path):
+    (tmp_path / "request.json").write_bytes(b"\xff\xfe\x80")
+    assert request_of(tmp_path) == {}
 
 
 def test_samples_added_to_a_closed_run_are_no_samples_of_it(folder):
