@@ -188,7 +188,7 @@ lose 1.38 to 1.48 times, of six 1.14 to 1.27 times what those of four lose."""
 def typical_efficiency(power_w: float, pole_pairs: int = 2) -> float:
     """Of a cage motor of this rated power and these pole pairs: of four poles 0.65 at 0.18 kW, 0.82 at 2.2 kW, 0.95 at 200 kW (IE1 to IE3
     lie within 0.1)."""
-    slower = max(pole_pairs / 2.0, 1.0) ** LOSS_BY_PAIRS
+    slower = float(max(pole_pairs / 2.0, 1.0) ** LOSS_BY_PAIRS)
     return max(1.0 - 0.22 * slower * float((power_w / 1000.0) ** -0.27), 0.35)
 
 
