@@ -356,6 +356,7 @@ def write_back_run(
     run: Run = "last",
     drive: Annotated[str | None, typer.Option("--drive", help="Drive URL; the run's own if not given.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    seal: Seal = None,
     plan: Annotated[bool, typer.Option("--plan", help="Only show what would change.")] = False,
     token: Annotated[str | None, typer.Option(help="Write only if the table of --plan still holds.")] = None,
     runs: Runs = RUNS,
@@ -364,7 +365,7 @@ def write_back_run(
     """Write an accepted result of a run that was made without --write-back into its drive, verified and stored."""
     from commissioner.cli.verbs.archived.deciding import write_run
 
-    write_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token)
+    write_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token, seal=seal)
 
 
 @app.command()

@@ -67,7 +67,7 @@ def restore(
         check_token(plan_restore(summary, request.drive), token)
     observe(Began("writing and reading back"))
     done = write_snapshot(summary, request.drive, key=key)
-    mark_restored(summary)
+    mark_restored(summary, key)
     return done
 
 
@@ -76,11 +76,11 @@ def planned_write(request: RunRequest) -> Plan:
     return plan_write_back(request.find(), request.drive)
 
 
-def write_run(request: RunRequest, token: str) -> Written:
-    """The accepted result of a run into its drive. Aborted where `token` is of another table."""
+def write_run(request: RunRequest, token: str, key: bytes | None = None) -> Written:
+    """The accepted result of a run into its drive. Aborted where `token` is of another table. `key`: of a sealed folder."""
     summary = request.find()
-    written = Written(summary.run, write_accepted(summary, request.drive, token))
-    mark_written(summary)
+    written = Written(summary.run, write_accepted(summary, request.drive, token, key))
+    mark_written(summary, key)
     return written
 
 

@@ -21,19 +21,21 @@ ROUNDING = 1e-5
 """A drive's own resolution may put a value on the edge of the box a little outside it."""
 
 
-def prove(folder: Path, profile: DriveProfile, snapshot: ParameterSnapshot, key: bytes | None = None) -> Verified:
+def prove(
+    folder: Path, profile: DriveProfile, snapshot: ParameterSnapshot, key: bytes | None = None, step: str = "restore"
+) -> Verified:
     """The folder is as its run left it, and no value in the snapshot is one that no motor of the plate has.
 
     DataRefused names the file, the value and the limit. A chain without a seal can be made anew by whoever edits the folder:
     the box and the drive's identity stand behind it.
     """
     verified = verify(folder, key)
-    refuse_damage(folder, verified, "restore", *DECIDES)
-    check_plausible(folder, profile, snapshot)
+    refuse_damage(folder, verified, step, *DECIDES)
+    check_plausible(folder, profile, snapshot, step)
     return verified
 
 
-def prove_verdict(folder: Path, verified: Verified) -> None:
+def prove_verdict(folder: Path, verified: Verified, step: str = "restore") -> None:
     """DataRefused: the run's samples do not lead to its verdict. Where another version made the run its decisions may
     differ, and an old folder has no version: neither is judged."""
     journal = read_journal(folder / "journal.jsonl")
@@ -45,13 +47,14 @@ def prove_verdict(folder: Path, verified: Verified) -> None:
         return
     done = replay(folder, salvage=not verified.is_whole)
     if done.difference is not None:
+        place, replayed, archived = done.difference.apart
         raise DataRefused(
-            f"{folder.name}: its samples do not lead to its decisions", step="restore", value=done.difference.replayed,
-            limit=done.difference.archived, remedy="the folder was changed: `commissioner replay` shows where; use another run",
+            f"{folder.name}: its samples do not lead to its decisions{f', in {place}' if place else ''}", step=step, value=replayed,
+            limit=archived, remedy="the folder was changed: `commissioner replay` shows where; use another run",
         )  # fmt: skip
 
 
-def check_plausible(folder: Path, profile: DriveProfile, snapshot: ParameterSnapshot) -> None:
+def check_plausible(folder: Path, profile: DriveProfile, snapshot: ParameterSnapshot, step: str = "restore") -> None:
     """DataRefused where a parameter is outside what motors of the run's plate can have."""
     plate = read_plate(folder)
     limits = parameter_limits(profile, plate)
@@ -60,7 +63,7 @@ def check_plausible(folder: Path, profile: DriveProfile, snapshot: ParameterSnap
             low, high = limits.get(name, (float("-inf"), float("inf")))
             if not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
                 raise DataRefused(
-                    f"{folder.name}: snapshot.json holds a {name} that no motor of this plate has", step="restore",
+                    f"{folder.name}: snapshot.json holds a {name} that no motor of this plate has", step=step,
                     value=f"{which}.{name} = {value:.6g} {profile.item(name).unit}", limit=f"{low:.4g} ... {high:.4g}",
                     remedy="if the drive did hold it before the run, enter it at the drive by hand",
                 )  # fmt: skip

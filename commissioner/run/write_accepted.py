@@ -28,16 +28,18 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.archive.summary import RunSummary
+from commissioner.run.archive.verify import Verified, refuse_damage
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.index.results import flux_level
-from commissioner.run.proof import prove, read_plate
+from commissioner.run.proof import prove, prove_verdict, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
 from commissioner.safety.limits import Bounds, SafetyFacts, permit
 
 REPLY_TIMEOUT_S = 0.5
+STEP = "write parameters"
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ class _Ready:
     url: str
     plate: Nameplate
     snapshot: ParameterSnapshot
+    verified: Verified
 
     @property
     def base(self) -> Nameplate:
@@ -113,17 +116,20 @@ def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, f
     return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
 
-def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
+def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | None = None) -> WriteReport:
     """The run's result into its drive, verified and stored, where the table of `token` still holds.
 
-    Aborted: it does not. IdentityMismatch: another drive. The run's journal says so before and after.
+    Aborted: it does not. DataRefused: the folder is not as its run left it, or its samples lead to another result. IdentityMismatch:
+    another drive. The run's journal says so before and after. `key`: of a sealed folder.
     """
-    ready, circuit = _ready(run, url), _circuit(run)
+    ready, circuit = _ready(run, url, key), _circuit(run)
+    refuse_damage(ready.folder, ready.verified, STEP, "blocks.bin")  # what is lost of the samples proves no result
+    prove_verdict(ready.folder, ready.verified, STEP)
     _check_bounds(circuit, ready.plate)
     address = parse_url(ready.url)
     with (
         DriveLock.take(address, ready.profile, "write back") as lock,
-        closing(RunFolder(ready.folder)) as journal,
+        closing(RunFolder(ready.folder, key)) as journal,
         OperatorStop(),
     ):
         lock.name_run(ready.folder.name)
@@ -153,13 +159,13 @@ def check_token(plan: Plan, token: str) -> None:
         )
 
 
-def _ready(run: RunSummary, url: str | None) -> _Ready:
+def _ready(run: RunSummary, url: str | None, key: bytes | None = None) -> _Ready:
     folder = Path(run.folder)
     request = read_saved(folder, "request.json", "profile", "url", "nameplate")
     if not (folder / "snapshot.json").is_file():
         raise DataRefused(
             f"{run.run} holds no snapshot",
-            step="write parameters",
+            step=STEP,
             value="no snapshot.json",
             limit="a run that reached its checks",
             remedy="choose another run",
@@ -168,15 +174,15 @@ def _ready(run: RunSummary, url: str | None) -> _Ready:
     if isinstance(parse_url(address), TlsUrl) and url is None:
         raise UsageError(
             f"the archive of {run.run} keeps no TLS files",
-            step="write parameters",
+            step=STEP,
             value=address,
             limit="an address with ca=, cert= and key=",
             remedy="give the drive's whole address with --drive",
         )
     snapshot = read_snapshot(folder, read_journal(folder / "journal.jsonl"))
     profile = archived_profile(str(request["profile"]))
-    prove(folder, profile, snapshot)
-    return _Ready(folder, profile, address, read_plate(folder), snapshot)
+    verified = prove(folder, profile, snapshot, key, STEP)
+    return _Ready(folder, profile, address, read_plate(folder), snapshot, verified)
 
 
 def _circuit(run: RunSummary) -> InverseGamma:
@@ -185,7 +191,7 @@ def _circuit(run: RunSummary) -> InverseGamma:
     if run.standing not in (ACCEPTED, RESTORED_SINCE) or not all(name in parameters for name in PARAMETERS):
         raise DataRefused(
             f"{run.run} has nothing to write",
-            step="write parameters",
+            step=STEP,
             value=run.standing,
             limit=ACCEPTED,
             remedy="choose a run whose result was accepted and is not in the drive",

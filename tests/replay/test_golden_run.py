@@ -4,6 +4,8 @@ import dataclasses
 import json
 import math
 import pickle
+import shutil
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -13,11 +15,13 @@ from commissioner.identify.analysis import identify
 from commissioner.procedure import steps
 from commissioner.procedure.energised import excite
 from commissioner.procedure.steps import Findings
+from commissioner.run import write_accepted
 from commissioner.run.archive import replay as replaying
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import learn_again, replay
+from commissioner.run.archive.summary import summarise
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
 from tests.support.archive.chained import rechain
 from tests.support.sim_process import SimProcess
@@ -190,6 +194,43 @@ def edit(folder, change):
     kept = [change(json.loads(line)) for line in path.read_text().splitlines()]
     path.write_text("".join(json.dumps(line) + "\n" for line in kept if line is not None))
     return folder
+
+
+class Sent(Exception):
+    """A drive was opened."""
+
+
+@pytest.mark.parametrize("forged", [{}, {"value": 3.1}])
+def test_a_result_that_its_samples_do_not_lead_to_is_not_written(fresh, tmp_path, monkeypatch, forged):
+    """The chain is right: somebody has closed the folder anew over another value, which the plate allows."""
+    folder = tmp_path / fresh.name
+    shutil.copytree(fresh, folder)
+    result = json.loads((folder / "result.json").read_text())
+    result["parameters"]["stator_resistance_ohm"] |= forged
+    with closing(RunFolder(folder)) as archive:
+        archive.journal("snapshot_restored", {})
+        archive.save("result.json", result)
+
+    def opened(*_, **__):
+        raise Sent
+
+    monkeypatch.setattr(write_accepted, "open_port", opened)
+    with pytest.raises(DataRefused if forged else Sent) as refusal:
+        write_accepted.write_accepted(summarise(folder), None, "token")
+    if forged:
+        assert refusal.value.what.endswith("in record.parameters.stator_resistance_ohm.value")
+        assert refusal.value.limit == 3.1
+
+
+def test_a_result_whose_samples_are_lost_is_not_written(fresh, tmp_path, monkeypatch):
+    folder = tmp_path / fresh.name
+    shutil.copytree(fresh, folder)
+    with closing(RunFolder(folder)) as archive:
+        archive.journal("snapshot_restored", {})
+    (folder / "blocks.bin").unlink()
+    monkeypatch.setattr(write_accepted, "open_port", None)
+    with pytest.raises(DataRefused, match=r"blocks\.bin is not as the run left it"):
+        write_accepted.write_accepted(summarise(folder), None, "token")
 
 
 def test_a_changed_end_is_reported(fresh, tmp_path):

@@ -43,6 +43,8 @@ stator, upwards three times for bars in which the current is displaced at stands
 ROTOR_OVER_SLIP = (0.35, 6.6)
 """R_R over rated slip and base impedance: the plate's box (`motor.nameplate`), three times its end for displacement."""
 
+COPPER_PER_K, WARMING_K = 1.0 / (234.5 + 25.0), 10.0
+"""Relative rise of copper's resistance per kelvin at 25 degC (IEC 60034-1), and a warming as locked points make it."""
 
 APART = {TERMINAL_PAIRS: 0.1, WINDINGS: 0.02}
 """By which the resistances between three pairs of terminals, or of three windings, may differ: sound ones by one or two per cent."""
@@ -164,6 +166,17 @@ def _readings(told: str | None, connection: str) -> list[tuple[str, float]]:
 def rotor_ohm(star_ohm: Array, measured_ohm: Array) -> float:
     """What is left for the rotor."""
     return float(np.median(measured_ohm - star_ohm))
+
+
+def of_one_measurement(star_ohm: Array, measured_ohm: Array) -> tuple[str, ...]:
+    """What one resistance for all points of a locked rotor leaves open; nothing where it was measured beside them."""
+    if star_ohm.size < 2 or np.ptp(star_ohm) > 0.0:
+        return ()
+    share = WARMING_K * COPPER_PER_K * float(star_ohm[0]) / rotor_ohm(star_ohm, measured_ohm)
+    return (
+        f"One winding resistance was given for all points: each {WARMING_K:g} K that the winding was warmer in the test than when it was "
+        f"measured are {share:.1%} in R_R, which its error does not hold.",
+    )
 
 
 def _is_possible(star_ohm: Array, measured_ohm: Array, metadata: Mapping[str, float | str], *, is_locked: bool) -> bool:

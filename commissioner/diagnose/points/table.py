@@ -11,7 +11,7 @@ import numpy as np
 
 from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
-from commissioner.diagnose.points.resistance import column_of, star_resistance, unread
+from commissioner.diagnose.points.resistance import column_of, of_one_measurement, star_resistance, unread
 from commissioner.errors import DataRefused
 from commissioner.records import IDLE_TEST, LOCKED_TEST, POINT_COLUMNS, POINT_FORMS
 
@@ -79,10 +79,14 @@ def read_points(
     if resistance is None:
         remarks.append(_without_resistance(columns, said))
         return Points(name, f, v, i, p, None, is_locked, tuple(remarks))
-    ohm = star_resistance(resistance[0], rows[:, 4], p / (3.0 * i**2), said, is_locked=is_locked)
+    measured = p / (3.0 * i**2)
+    ohm = star_resistance(resistance[0], rows[:, 4], measured, said, is_locked=is_locked)
     if isinstance(ohm, DataRefused):
         return ohm
-    return Points(name, f, v, i, p, ohm.star_ohm, is_locked, (*remarks, *ohm.remarks))
+    remarks += ohm.remarks
+    if is_locked and ohm.star_ohm is not None:
+        remarks += of_one_measurement(ohm.star_ohm, measured)
+    return Points(name, f, v, i, p, ohm.star_ohm, is_locked, tuple(remarks))
 
 
 def _without_resistance(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> str:

@@ -170,7 +170,8 @@ def _of_power(sheet: Sheet) -> Iterator[Conflict]:
             f"efficiency {efficiency:.4g} printed, {text}", f"the same within {APART:.0%} and the last digits",
             {"efficiency": ("rated_current_a",), "current": ("efficiency",)},
         )  # fmt: skip
-    typical, (least, best) = typical_efficiency(power), efficiency_range(power)
+    pairs = pole_pairs(sheet) or 2
+    typical, (least, best) = typical_efficiency(power, pairs), efficiency_range(power, pairs)
     if efficiency is None and not least < implied < best:
         yield Conflict(
             f"power, voltage, current and power factor contradict each other{_hint(implied / typical)}", text,

@@ -17,12 +17,11 @@ class JournalFollower:
 
     def new(self) -> list[JsonObject]:
         """The whole records since the last call; a line that is still being written waits for the next one."""
-        try:
-            with self._path.open("rb") as file:
-                file.seek(self.offset)
-                data = file.read()
-        except FileNotFoundError:
+        if not self._path.is_file():  # none yet, or a pipe in its place, which would be waited for
             return []
+        with self._path.open("rb") as file:
+            file.seek(self.offset)
+            data = file.read()
         whole = data[: data.rfind(b"\n") + 1]
         self.offset += len(whole)
         records = (read_document(line.decode("utf-8", "replace")) for line in whole.splitlines())

@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,24 @@ class Difference:
     number: int
     archived: Mapping[str, Any] | None
     replayed: Mapping[str, Any] | None
+
+    @property
+    def apart(self) -> tuple[str, object, object]:
+        """Where it first differs, what was decided again, and what is archived."""
+        return apart(self.replayed, self.archived)
+
+
+def apart(one: object, other: object, place: str = "") -> tuple[str, object, object]:
+    """Where two documents first differ, as `record.remarks.0`, and what each has there; None for what one of them lacks."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        pairs = [(str(key), one.get(key), other.get(key)) for key in (*one, *(key for key in other if key not in one))]
+    elif isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        pairs = [(str(number), *pair) for number, pair in enumerate(zip_longest(one, other))]
+    else:
+        return place, one, other
+    differing = ((key, a, b) for key, a, b in pairs if a != b)
+    key, a, b = next(differing, ("", one, other))
+    return apart(a, b, f"{place}.{key}".strip(".")) if key else (place, one, other)
 
 
 @dataclass(frozen=True)

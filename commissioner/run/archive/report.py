@@ -31,21 +31,21 @@ def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> 
     folder.save_text("report.html", page)
 
 
-def mark_restored(run: RunSummary) -> None:
+def mark_restored(run: RunSummary, key: bytes | None = None) -> None:
     """The report says on top that the drive holds its old values again."""
-    _mark(run, "Restored on {}: the drive took back the values it had before this run.")
+    _mark(run, "Restored on {}: the drive took back the values it had before this run.", key)
 
 
-def mark_written(run: RunSummary) -> None:
+def mark_written(run: RunSummary, key: bytes | None = None) -> None:
     """The report says on top that the drive holds the values that were only accepted when it was made."""
-    _mark(run, "Written on {}: the drive took the values of this report, read back.")
+    _mark(run, "Written on {}: the drive took the values of this report, read back.", key)
 
 
-def _mark(run: RunSummary, sentence: str) -> None:
+def _mark(run: RunSummary, sentence: str, key: bytes | None) -> None:
     """A disk that is full leaves the report as it is."""
     page = Path(run.folder) / "report.html"
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    with suppress(OSError), closing(RunFolder(page.parent)) as folder:
+    with suppress(OSError), closing(RunFolder(page.parent, key)) as folder:
         folder.save_text(page.name, with_notice(page.read_text("utf-8"), sentence.format(when)))
 
 

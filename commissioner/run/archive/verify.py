@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 INTACT, UNVERIFIED, CUT_OFF, DAMAGED = "intact", "unverified", "cut off", "damaged"
 DECIDES = ("journal.jsonl", "snapshot.json", "request.json", "result.json", SUMMARY)
 """What a restore rests on; of a damaged sample or page it only speaks."""
+PAGE = "report.html"
+NO_SEAL = "no seal: whoever could write the folder could have made it all"
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ def verify(folder: Path, key: bytes | None = None) -> Verified:
     counts = _count(folder / "blocks.bin", damage)
     closed = _closings(whole)
     losses = [
-        *_journal_losses(lines, is_chained=is_chained),
+        *_journal_losses(lines),
         *_end_losses(folder, whole, is_over=is_over),
         *_block_losses(folder, whole, damage, is_over=is_over),
         *_file_losses(folder, closed),
@@ -78,7 +80,7 @@ def losses_at_sight(folder: Path) -> tuple[Loss, ...]:
     lines, _ = read_lines(folder / "journal.jsonl")
     whole = _whole_records(lines)
     return (
-        *_journal_losses(lines, is_chained=_is_chained(whole)),
+        *_journal_losses(lines),
         *_end_losses(folder, whole, is_over=_is_over(whole)),
         *_file_losses(folder, _closings(whole)),
     )
@@ -132,7 +134,7 @@ def _whole_records(lines: list[Line]) -> list[Record]:
     return records
 
 
-def _journal_losses(lines: list[Line], *, is_chained: bool) -> Iterator[Loss]:
+def _journal_losses(lines: list[Line]) -> Iterator[Loss]:
     """The first place where the journal is not a row of records that follow each other."""
     if not lines:
         yield Loss("journal.jsonl", None, "no record in it")
@@ -148,7 +150,7 @@ def _journal_losses(lines: list[Line], *, is_chained: bool) -> Iterator[Loss]:
         if has_begun and line.record.get("previous") != before:
             yield Loss("journal.jsonl", number, _unlike(number, line.record))
             return
-        if is_chained and not has_begun and line.record["kind"] == "run_started":
+        if not has_begun and line.record["kind"] == "run_started":  # versions without a chain did not write it
             yield Loss("journal.jsonl", number, f"record {number} has lost its digest")
             return
         before = line.digest
@@ -222,6 +224,10 @@ def _block_losses(folder: Path, whole: list[Record], damage: list[BlockDamage], 
         yield Loss("blocks.bin", None, f"{len(data)} of {wanted} bytes")
     elif changed is not None and not damage:
         yield Loss("blocks.bin", changed, f"samples written before record {changed} were changed")
+    elif _closings(whole) and len(data) > wanted and not damage:
+        yield Loss(
+            "blocks.bin", None, f"{len(data) - wanted} bytes of samples behind the {wanted} that the run had written"
+        )
 
 
 def _covered(whole: list[Record]) -> Iterator[tuple[int, int, str]]:
@@ -266,13 +272,25 @@ def _seal(closed: list[Record], key: bytes | None) -> tuple[str, list[Loss]]:
     if key is None:
         return ("sealed with a key, not checked" if sealed else "none"), []
     if not sealed:
-        return "none", [Loss("journal.jsonl", None, "no seal: whoever could write the folder could have made it all")]
+        return "none", [
+            Loss("journal.jsonl", None, NO_SEAL if closed else f"{NO_SEAL}; a run that was cut off never got one")
+        ]
     last = sealed[-1]
     if not is_sealed_by(key, last.get("previous"), last["record"]):
         return "wrong", [Loss("journal.jsonl", last["n"], "the seal is not of this key, or what it covers was changed")]
-    if last is not closed[-1]:
-        return f"valid up to record {last['n']}; what was added after it has none", []
-    return "valid", []
+    if last is closed[-1]:
+        return "valid", []
+    said = f"valid up to record {last['n']}; what was added after it has none"
+    return said, list(_changed_since(last, closed[-1]))
+
+
+def _changed_since(sealed: Record, last: Record) -> Iterator[Loss]:
+    """Files that a later closing record without a seal covers otherwise than the sealed one: anybody can have written that. The page
+    is left out: it follows from the others, and whoever restores without the key writes on top of it that he did."""
+    now, then = last["record"].get("files"), sealed["record"].get("files")
+    for name, wanted in then.items() if isinstance(then, dict) else ():
+        if name != PAGE and (not isinstance(now, dict) or now.get(name) != wanted):
+            yield Loss(str(name), None, f"it was changed after record {sealed['n']}, the last that the key sealed")
 
 
 # --- words -----------------------------------------------------------------------------------------------------------

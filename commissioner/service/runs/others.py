@@ -10,7 +10,7 @@ from pathlib import Path
 from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError
 from commissioner.run.archive.catalogue import age
-from commissioner.run.archive.documents import read_document
+from commissioner.run.archive.summary import read_file
 from commissioner.service.library import Drive, Library
 
 FRESH_S = 5.0
@@ -46,7 +46,7 @@ def is_copied(folder: Path, last_utc: str) -> bool:
 def request_of(folder: Path) -> JsonObject:
     """What a run was asked to do; empty as long as that is not written down."""
     with contextlib.suppress(OSError):
-        return read_document((folder / "request.json").read_text("utf-8"))
+        return read_file(folder / "request.json")
     return {}
 
 

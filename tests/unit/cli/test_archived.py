@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from commissioner.cli.screens import screen
-from commissioner.cli.verbs.archived import deciding, runs, verify
+from commissioner.cli.verbs.archived import runs, verify
+from commissioner.run.archive.replay import apart
 from commissioner.text import counted, did_you_mean
 
 
@@ -58,7 +59,7 @@ def test_only_one_name_that_is_near_is_asked_back(asked, said):
 def test_a_decision_that_comes_out_otherwise_is_told_at_the_place_that_differs():
     archived = {"kind": "result", "record": {"outcome": "commissioned", "remarks": ["a", "b"]}}
     replayed = {"kind": "result", "record": {"outcome": "commissioned", "remarks": ["a", "c", "d"]}}
-    assert deciding.apart(replayed, archived) == ("record.remarks.1", "c", "b")
-    assert deciding.apart({"x": [1]}, {"x": [1, 2]}) == ("x.1", None, 2)
-    assert deciding.apart("c", "b") == ("", "c", "b")
-    assert deciding.apart({"x": 1}, {}) == ("x", 1, None)
+    assert apart(replayed, archived) == ("record.remarks.1", "c", "b")
+    assert apart({"x": [1]}, {"x": [1, 2]}) == ("x.1", None, 2)
+    assert apart("c", "b") == ("", "c", "b")
+    assert apart({"x": 1}, {}) == ("x", 1, None)

@@ -81,6 +81,40 @@ def test_the_best_motors_pass_with_a_plate_rounded_by_a_per_cent(power_w, effici
     )
 
 
+IE1_SLOW = {
+    (120, 3): 0.383,
+    (120, 4): 0.31,
+    (180, 3): 0.455,
+    (180, 4): 0.38,
+    (250, 4): 0.434,
+    (370, 4): 0.497,
+    (550, 4): 0.561,
+}
+"""IEC 60034-30-1 at 1000 and 750 1/min."""
+
+
+@pytest.mark.parametrize(("motor", "efficiency"), IE1_SLOW.items())
+def test_small_motors_of_many_poles_pass_with_the_little_efficiency_that_they_have(motor, efficiency):
+    power_w, pairs = motor
+    current = power_w / (np.sqrt(3) * 400 * 0.6 * efficiency)
+    slow = dataclasses.replace(
+        PLATE, rated_power_w=float(power_w), rated_current_a=current, power_factor=0.6, pole_pairs=pairs,
+        rated_speed_rpm=2700.0 / pairs,
+    )  # fmt: skip
+    assert check(slow) == ()
+
+
+@pytest.mark.parametrize("power_w", [550.0, 2200.0, 75000.0])
+def test_the_delta_current_beside_the_star_voltage_of_eight_poles_is_refused_all_the_same(power_w):
+    efficiency = {550.0: 0.73, 2200.0: 0.819, 75000.0: 0.931}[power_w]  # IE3
+    current = np.sqrt(3) * power_w / (np.sqrt(3) * 400 * 0.7 * efficiency)
+    slow = dataclasses.replace(
+        PLATE, rated_power_w=power_w, rated_current_a=current, power_factor=0.7, pole_pairs=4, rated_speed_rpm=710.0
+    )
+    (problem,) = check(slow)
+    assert f"400 V with {current / np.sqrt(3):.3g} A would fit" in problem.expected
+
+
 def test_a_small_motors_delta_voltage_beside_its_star_current_is_refused_with_the_sqrt_3():
     small = dataclasses.replace(
         PLATE, rated_power_w=120.0, rated_voltage_v=230.0, rated_current_a=0.42, power_factor=0.72

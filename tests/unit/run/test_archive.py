@@ -24,10 +24,13 @@ from commissioner.run.archive import report
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder, write_recording
+from commissioner.run.archive.follow import JournalFollower
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.seal import read_key
 from commissioner.run.archive.summary import summarise
+from commissioner.run.archive.verify import verify
 from commissioner.service.archive import Archive
+from commissioner.service.runs.others import request_of
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
@@ -251,6 +254,61 @@ def test_samples_are_not_exported_past_a_damaged_journal(tmp_path):
     journal.write_text(journal.read_text("utf-8").replace("anna", "bert"), "utf-8")
     with pytest.raises(DataRefused, match=r"journal\.jsonl is not as the run left it"):
         export_run(tmp_path, run, tmp_path / "out.csv")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without named pipes")
+def test_a_pipe_in_a_files_place_is_not_waited_for(tmp_path):
+    """The service follows what lies in its archive: one such folder stopped it for good, also for SIGTERM."""
+    for name in ("journal.jsonl", "request.json"):
+        os.mkfifo(tmp_path / name)
+    assert JournalFollower(tmp_path / "journal.jsonl").new() == []
+    assert request_of(tmp_path) == {}
+
+
+def test_a_request_that_is_no_text_is_none(tmp_path):
+    (tmp_path / "request.json").write_bytes(b"\xff\xfe\x80")
+    assert request_of(tmp_path) == {}
+
+
+def test_samples_added_to_a_closed_run_are_no_samples_of_it(folder):
+    folder.append(_block(0), 0)
+    folder.close()
+    assert verify(folder.path).losses == ()
+    path = folder.path / "blocks.bin"
+    size = path.stat().st_size
+    path.write_bytes(2 * path.read_bytes())
+    assert [(loss.file, loss.what) for loss in verify(folder.path).losses] == [
+        ("blocks.bin", f"{size} bytes of samples behind the {size} that the run had written")
+    ]
+
+
+def test_samples_of_a_run_that_was_killed_may_be_ahead_of_its_journal(folder):
+    folder.append(_block(0), 0)
+    assert (verify(folder.path).state, verify(folder.path).losses) == ("cut off", ())
+
+
+def test_a_journal_whose_digests_were_all_taken_out_is_of_no_older_version(folder):
+    folder.close()
+    path = folder.path / "journal.jsonl"
+    bare = [{**json.loads(line), "previous": None, "blocks": None} for line in path.read_text("utf-8").splitlines()]
+    kept = [{key: value for key, value in line.items() if value is not None} for line in bare]
+    path.write_text("".join(json.dumps(line) + "\n" for line in kept), "utf-8")
+    found = verify(folder.path)
+    assert (found.state, found.losses[0].what) == ("damaged", "record 0 has lost its digest")
+
+
+@pytest.mark.parametrize(("name", "files"), [("snapshot.json", ["snapshot.json"]), ("report.html", [])])
+def test_a_closing_record_without_the_key_covers_no_other_file_than_the_sealed_one(tmp_path, name, files):
+    key = b"a key of thirty-two bytes or so."
+    with closing(RunFolder.create(tmp_path, "sealed", key)) as sealed:
+        sealed.journal("run_ended", {"outcome": "commissioned"})
+        sealed.save("snapshot.json", {"in_use": {"stator_resistance": 3.2}})
+        sealed.save_text("report.html", "<p>3.2</p>")
+    assert (verify(sealed.path, key).seal, verify(sealed.path, key).losses) == ("valid", ())
+    with closing(RunFolder(sealed.path)) as forged:
+        forged.save_text(name, '{"in_use": {"stator_resistance": 3.3}}')
+    assert [loss.file for loss in verify(sealed.path, key).losses] == files
+    assert verify(sealed.path).losses == ()
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

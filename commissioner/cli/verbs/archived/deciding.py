@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import zip_longest
 from pathlib import Path
 
 from commissioner.cli.screens import screen
@@ -59,7 +58,15 @@ def restore_run(
 
 
 def write_run(
-    runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, plan: bool = False, token: str | None = None
+    runs: Path,
+    run: str,
+    drive: str | None,
+    *,
+    yes: bool,
+    as_json: bool,
+    plan: bool = False,
+    token: str | None = None,
+    seal: Path | None = None,
 ) -> None:
     """An accepted result into the drive, after the table was shown and agreed to."""
     request = write.RunRequest(runs, run, drive)
@@ -71,7 +78,10 @@ def write_run(
     if not yes:
         _show_plan(shown, as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
-    done = write.write_run(request, shown.token if token is None else token)
+    with screen.busy("proving the result, writing and reading back"):
+        done = write.write_run(
+            request, shown.token if token is None else token, read_key(seal) if seal is not None else None
+        )
     report = done.report
     if as_json:
         reason = f"{counted(len(report.written), 'value')} written, {screen.kept(report.is_stored)}"
@@ -124,7 +134,7 @@ def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
             raise SystemExit(DataRefused.exit_code)
         return
     if done.difference is not None:
-        place, replayed, archived = apart(done.difference.replayed, done.difference.archived)
+        place, replayed, archived = done.difference.apart
         raise DataRefused(
             f"decision {done.difference.number} of {done.run} comes out otherwise{f' in {place}' if place else ''}", step="replay",
             value=replayed, limit=archived,
@@ -132,16 +142,3 @@ def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
         )  # fmt: skip
     until = "" if verified.is_whole else f" up to the first loss; {screen.text(verified.usable)}"
     screen.out.print(f"[green]{done.decisions} decisions, all identical[/]{until}")
-
-
-def apart(one: object, other: object, place: str = "") -> tuple[str, object, object]:
-    """Where two documents first differ, as `record.remarks.0`, and what each has there; None for what one of them lacks."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        pairs = [(str(key), one.get(key), other.get(key)) for key in (*one, *(key for key in other if key not in one))]
-    elif isinstance(one, list | tuple) and isinstance(other, list | tuple):
-        pairs = [(str(number), *pair) for number, pair in enumerate(zip_longest(one, other))]
-    else:
-        return place, one, other
-    differing = ((key, a, b) for key, a, b in pairs if a != b)
-    key, a, b = next(differing, ("", one, other))
-    return apart(a, b, f"{place}.{key}".strip(".")) if key else (place, one, other)

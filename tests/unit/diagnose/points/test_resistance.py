@@ -99,3 +99,24 @@ def test_what_contradicts_is_refused_with_both_values():
         diagnose_points(read_points(table(motor, 2 * motor.truth[0], "winding_resistance_uv_ohm"), "x")).causes
         is not None
     )
+
+
+@pytest.mark.parametrize("motor", MOTORS[::6], ids=lambda motor: motor.name[:20])
+def test_what_a_winding_that_was_measured_cold_adds_to_the_rotor_is_told(motor):
+    """Truth: R_s 10 K below the test's, from a closed form; constant bars."""
+    cold = motor.truth[0] / (1.0 + 10.0 / 259.5)
+    seen = read_points(table(motor, 2.0 * cold, "winding_resistance_uv_ohm"), "locked", {})
+    said = next(remark for remark in seen.remarks if remark.startswith("One winding resistance"))
+    share = float(said.split(" are ")[1].split("%")[0])
+    rotor = [
+        diagnose_points(read_points(table(motor, 2.0 * ohm, "winding_resistance_uv_ohm"), "locked", {}))
+        for ohm in (cold, motor.truth[0])
+    ]
+    shifted, true = (found.parameters_after["rotor_resistance_ohm"].value for found in rotor)
+    assert share == pytest.approx(100.0 * (shifted / true - 1.0), rel=0.15, abs=0.1)
+
+
+def test_a_resistance_that_was_measured_at_every_point_leaves_no_warming_open():
+    columns = table(MOTORS[0], 1.0, "winding_resistance_uv_ohm")
+    columns["winding_resistance_uv_ohm"] = 2.0 * MOTORS[0].truth[0] * np.linspace(1.0, 1.02, 8)
+    assert not any("One winding resistance" in remark for remark in read_points(columns, "locked", {}).remarks)
