@@ -20,6 +20,8 @@ tenth of it. Beyond it the supply's own frequency pulses, and what repeats in th
 SWING_BAND_HZ = 15.0
 RAMP = 0.9
 """Of all that the frequency moves, from which on, end to end, it ramps."""
+MOST_OF_DROP = 0.5
+"""Of the shaft's distance from synchronous speed, to which it must be known: the slip, and with it every parameter, is no better."""
 LEAST_TURNS = 30
 LEAST_LOAD_PERIODS = 8
 
@@ -108,5 +110,15 @@ def too_little(frame: TurningFrame, part: slice, found: Found, search: ShaftSear
             found.shaft.frequency_hz,
             "a line above the noise of its 64 blocks",
             "record longer, at steady load or with better current sensors",
+        )
+    drop_hz, std_hz = abs(search.synchronous_hz - found.shaft.frequency_hz), found.shaft.frequency_std_hz
+    if std_hz > MOST_OF_DROP * drop_hz:
+        return Finding(
+            "no_shaft_line",
+            "refused",
+            f"the shaft's line lies {drop_hz:.2g} +- {std_hz:.2g} Hz beside the supply's: not told from it within {length:.2f} s, the slip is not known",
+            std_hz,
+            f"{MOST_OF_DROP * drop_hz:.2g} Hz",
+            "record 30-60 s at steady load, or at more load",
         )
     return None
