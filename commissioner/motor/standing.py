@@ -3,10 +3,10 @@ magnetizing branch takes): it is several times larger once the shaft turns at it
 
 from __future__ import annotations
 
-ROTOR_SHARE = 0.4
-"""Of a standing motor's resistance, the rotor's at least: with R_s = R_R, cold bars of small depth, half of it."""
-MOST_RISE = 0.5
-"""Of the resistance since closing, from which on a shaft may be coming up to speed: heat alone makes so much in half a minute."""
+ROTOR_SHARE = 0.3
+"""Of a standing motor's resistance, the rotor's at least: 0.31 ... 0.71 in 37 circuits of 0.18 kW to 1.7 MW."""
+MOST_RISE = 0.3
+"""Of the resistance since closing, from which on a shaft may be coming up to speed, and below which heat alone (75 K) makes it."""
 MOST_SPEED = MOST_RISE / (MOST_RISE + ROTOR_SHARE)
 """Of the synchronous speed, that belongs to this rise."""
 LEAST_SPEED = 0.02

@@ -167,9 +167,10 @@ def _refined(
     drift = tracking.track(tracking.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
     shift = drift.mean_rad_per_s / (2 * np.pi)
     std = float(np.hypot(std, drift.mean_error_rad_per_s / (2 * np.pi)))
-    if seen and not told:
+    is_told = bool(told or not seen)
+    if not is_told:
         std = float(np.hypot(std, max(_beside_mains(frame, part, h * (frequency + shift)) / h for h in strongest) * EVENLY))
-    return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean())
+    return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean(), is_told)
 
 
 def _beside_mains(frame: TurningFrame, part: slice, line_hz: float) -> float:

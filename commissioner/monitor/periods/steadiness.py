@@ -20,8 +20,6 @@ tenth of it. Beyond it the supply's own frequency pulses, and what repeats in th
 SWING_BAND_HZ = 15.0
 RAMP = 0.9
 """Of all that the frequency moves, from which on, end to end, it ramps."""
-MOST_OF_DROP = 0.5
-"""Of the shaft's distance from synchronous speed, to which it must be known: the slip, and with it every parameter, is no better."""
 LEAST_TURNS = 30
 LEAST_LOAD_PERIODS = 8
 
@@ -111,14 +109,14 @@ def too_little(frame: TurningFrame, part: slice, found: Found, search: ShaftSear
             "a line above the noise of its 64 blocks",
             "record longer, at steady load or with better current sensors",
         )
-    drop_hz, std_hz = abs(search.synchronous_hz - found.shaft.frequency_hz), found.shaft.frequency_std_hz
-    if std_hz > MOST_OF_DROP * drop_hz:
+    if not found.shaft.is_told_from_mains:
+        drop_hz = abs(search.synchronous_hz - found.shaft.frequency_hz)
         return Finding(
             "no_shaft_line",
             "refused",
-            f"the shaft's line lies {drop_hz:.2g} +- {std_hz:.2g} Hz beside the supply's: not told from it within {length:.2f} s, the slip is not known",
-            std_hz,
-            f"{MOST_OF_DROP * drop_hz:.2g} Hz",
+            f"the shaft's line, {drop_hz:.2g} +- {found.shaft.frequency_std_hz:.2g} Hz beside the supply's, is not told from it within {length:.2f} s: the slip is not known",
+            drop_hz * length,
+            "a period of the recording's length apart",
             "record 30-60 s at steady load, or at more load",
         )
     return None

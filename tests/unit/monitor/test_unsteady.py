@@ -1,5 +1,6 @@
 """Loads that step, build up, drift and swing, and supplies that ramp slowly or step; truth from phasors and closed forms."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -299,3 +300,33 @@ def test_a_fault_that_turns_the_power_factor_is_no_other_plate_where_the_shaft_i
     )
     seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
     assert isinstance(seen, Refused) and seen.reason.code == code
+
+
+def closed(slip, seconds=4.0, line_to_line=False):
+    """The plate's circuit, off to 0.3 s, then at each moment in its steady state at this slip."""
+    t = np.arange(round(seconds / 5e-4)) * 5e-4
+    z = np.array([stator_impedance(from_nameplate(PLATE), 100 * np.pi, s) for s in np.broadcast_to(slip(t), t.shape)])
+    v = 326.6 * np.exp(100j * np.pi * t) * (t > 0.3)
+    i, u = ([(x * np.exp(-2j * np.pi * k / 3)).real for k in range(3)] for x in (v / z, v))
+    if line_to_line:
+        u = [u[k] - u[(k + 1) % 3] for k in range(3)]
+    return RunningRecording(t, tuple(i), tuple(u), line_to_line, None, 5e-4)
+
+
+@pytest.mark.parametrize("line_to_line", [False, True])
+@pytest.mark.parametrize("last", [1.0, 0.9])
+def test_a_motor_that_does_not_start_is_said_to_stand(last, line_to_line):
+    """It was "never in a steady state", with the remedy of recording longer."""
+    recording = closed(lambda t: np.interp(t, [0.3, 4.0], [1.0, last]), line_to_line=line_to_line)
+    seen, _, _ = in_its_states(recording, PLATE, Wishes())
+    assert seen.reason.code == "not_started" and "the motor does not start: for 3.7 s" in seen.reason.what
+    ohm = abs(stator_impedance(from_nameplate(PLATE), 100 * np.pi, 1.0))
+    assert seen.reason.value == pytest.approx(326.6 / ohm / np.sqrt(2.0) / PLATE.rated_current_a, rel=0.03)
+    said = int(re.search(r"no more than (\d+)%", seen.reason.what)[1]) / 100
+    assert 1.0 - last <= said + 0.005 and said <= 0.02 + 2.0 * (1.0 - last)
+    assert "blocked shaft" in seen.reason.remedy
+
+
+def test_a_motor_that_speeds_up_to_the_end_is_not_said_to_stand():
+    seen, _, _ = in_its_states(closed(lambda t: np.interp(t, [0.3, 4.0], [1.0, 0.4])), PLATE, Wishes())
+    assert seen.reason.code == "no_steady_stretch"
