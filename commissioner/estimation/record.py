@@ -106,7 +106,9 @@ class Record:
         """Why a fit fails where the motor did not start; None where it did."""
         if not self.not_started:
             return None
-        return DataRefused("; ".join(self.not_started), step=step, value="no start", limit="a start that ends", remedy=FREE_IT)
+        return DataRefused(
+            "; ".join(self.not_started), step=step, value="no start", limit="a start that ends", remedy=FREE_IT
+        )
 
     @property
     def has_start(self) -> bool:
@@ -208,7 +210,10 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         most = MOST_SAMPLES // len(windows)
         windows = [first_part(w, min(most, w.count)) for w in windows]
         remarks.append(f"Of each stretch the first {most * period:.3g} s are used.")
-    remarks += (f"{said}. That tells the sum of R_s and R_R, and L_sigma, and little else: {FREE_IT}." for said in standing_still)
+    remarks += (
+        f"{said}. That tells the sum of R_s and R_R, and L_sigma, and little else: {FREE_IT}."
+        for said in standing_still
+    )
     if computed:
         remarks.append(
             f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "

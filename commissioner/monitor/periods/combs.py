@@ -169,7 +169,9 @@ def _refined(
     std = float(np.hypot(std, drift.mean_error_rad_per_s / (2 * np.pi)))
     is_told = bool(told or not seen)
     if not is_told:
-        std = float(np.hypot(std, max(_beside_mains(frame, part, h * (frequency + shift)) / h for h in strongest) * EVENLY))
+        std = float(
+            np.hypot(std, max(_beside_mains(frame, part, h * (frequency + shift)) / h for h in strongest) * EVENLY)
+        )
     return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean(), is_told)
 
 

@@ -103,7 +103,9 @@ def _never_steady(recording: RunningRecording, stretches: tuple[Stretch, ...], p
     last = stretches[-1]
     share = last.current_a / plate.rated_current_a
     has_closed = len(stretches) > 1 and {s.state for s in stretches[:-1]} <= UNFED
-    speed = highest_standing_speed(cut_out(recording, last, 0.0), plate) if has_closed and last.state == "start" else None
+    speed = (
+        highest_standing_speed(cut_out(recording, last, 0.0), plate) if has_closed and last.state == "start" else None
+    )
     if speed is not None:
         return Finding(
             "not_started", "refused", standing.words(share, last.duration_s, speed), share, f"a start within {last.duration_s:.3g} s",

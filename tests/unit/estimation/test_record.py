@@ -253,5 +253,11 @@ def test_a_motor_that_does_not_start_is_said_to_stand(has_speed):
 
 @pytest.mark.parametrize("has_speed", [True, False])
 def test_a_motor_that_starts_is_not_said_to_stand(has_speed):
-    record = prepare([closed(lambda t: np.interp(t, [0.1, 2.0], [1.0, 0.4]), has_speed), closed(lambda t: np.interp(t, [0.3, 0.6], [1.0, 0.03]), has_speed)], PLATE)
+    record = prepare(
+        [
+            closed(lambda t: np.interp(t, [0.1, 2.0], [1.0, 0.4]), has_speed),
+            closed(lambda t: np.interp(t, [0.3, 0.6], [1.0, 0.03]), has_speed),
+        ],
+        PLATE,
+    )
     assert record.not_started == () and record.refusal_of_standing("identify") is None

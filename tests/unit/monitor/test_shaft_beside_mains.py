@@ -61,7 +61,7 @@ def test_a_line_that_is_one_with_the_mains_tells_no_frequency(second: float) -> 
 
 
 def test_what_drifts_is_no_load() -> None:
-    """"1.6e-09 Hz, the slowest line of the currents, fits 0.0 times" had been the reason of a refusal."""
+    """ "1.6e-09 Hz, the slowest line of the currents, fits 0.0 times" had been the reason of a refusal."""
     frame = SimpleNamespace(time_s=np.arange(3000) * 1e-3)
     for hertz, drifts in ((0.2, True), (1.0, False)):
         load = Periodicity("load", hertz, 1e-3, "clock", 100.0, (1,))
