@@ -154,12 +154,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     sigmas, without = [], set("uvw") if computed else set[str]()
     for one in recordings:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
-            raise _refused(
-                f"{one.source}: sampled at another rate than the first file",
-                one.sample_period_s,
-                period,
-                "diagnose them one by one",
-            )
+            what = f"{one.source}: sampled at another rate than the first file"
+            raise _refused(what, one.sample_period_s, period, "diagnose them one by one")
         current, voltage = _currents(one), _voltages(one)
         _check(one, voltage, scales)
         open_phases = _open_phases(one, current, scales)
@@ -214,13 +210,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         f"{said}. That tells the sum of R_s and R_R, and L_sigma, and little else: {FREE_IT}."
         for said in standing_still
     )
-    if computed:
-        remarks.append(
-            f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "
-            "the sum; unlike gains of two sensors are looked for in each pair."
-        )
-    elif not has_zero:
-        remarks.append("Two currents only: the third is taken as minus their sum, with what one sensor reads wrong.")
+    remarks += _of_third_current(computed, has_zero)
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
     commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
@@ -230,6 +220,17 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _of_third_current(computed: Sequence[str], has_zero: bool) -> Iterator[str]:
+    """A remark where fewer than three currents were measured. `computed`: the files whose third is minus the sum of two."""
+    if computed:
+        yield (
+            f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "
+            "the sum; unlike gains of two sensors are looked for in each pair."
+        )
+    elif not has_zero:
+        yield "Two currents only: the third is taken as minus their sum, with what one sensor reads wrong."
 
 
 def _speed_noise(recordings: Sequence[RunningRecording], plate: Nameplate) -> float:
