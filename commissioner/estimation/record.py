@@ -12,6 +12,7 @@ from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
+from commissioner.motor import standing
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -26,6 +27,7 @@ speed; the current a volt over its largest since closing of one that is past its
 nothing changes, and where more current flows a volt than a block before: a shaft that speeds up takes less and less. (A load that pulsates changes
 the current in every block: all of a recording was `start`, a load step in it had knots 0.15 s apart, and a healthy motor without a speed
 column was called unexplained.)"""
+FREE_IT = "look at shaft, load, voltage and connection, and record a start that ends"
 STEADY_SHARE = 0.95
 """Of the samples of one steady load: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 ONE_LOAD = 0.1
@@ -97,6 +99,16 @@ class Record:
     sigma_w: float = 0.0
     remarks: tuple[str, ...] = ()
     computed: str = ""
+    not_started: tuple[str, ...] = ()
+    """Of a motor that was switched on and does not come up to speed: that it does not."""
+
+    def refusal_of_standing(self, step: str) -> DataRefused | None:
+        """Why a fit fails where the motor did not start; None where it did."""
+        if not self.not_started:
+            return None
+        return DataRefused(
+            "; ".join(self.not_started), step=step, value="no start", limit="a start that ends", remedy=FREE_IT
+        )
 
     @property
     def has_start(self) -> bool:
@@ -135,18 +147,15 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     period = recordings[0].sample_period_s
     windows: list[Window] = []
     remarks: list[str] = []
+    standing_still: list[str] = []
     has_speed = all(r.speed_rad_per_s is not None and np.isfinite(r.speed_rad_per_s).any() for r in recordings)
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
     has_zero = not computed and all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
     sigmas, without = [], set("uvw") if computed else set[str]()
     for one in recordings:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
-            raise _refused(
-                f"{one.source}: sampled at another rate than the first file",
-                one.sample_period_s,
-                period,
-                "diagnose them one by one",
-            )
+            what = f"{one.source}: sampled at another rate than the first file"
+            raise _refused(what, one.sample_period_s, period, "diagnose them one by one")
         current, voltage = _currents(one), _voltages(one)
         _check(one, voltage, scales)
         open_phases = _open_phases(one, current, scales)
@@ -183,7 +192,9 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             remarks.append(
                 f"{one.source}: {lost} samples have no speed: the stretches used end there and begin behind it."
             )
-        windows += _windows(signed, current, voltage, plate, has_speed, scales, ~is_open)
+        own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
+        standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
+        windows += own
     if not windows:
         raise _refused(
             " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
@@ -195,13 +206,11 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         most = MOST_SAMPLES // len(windows)
         windows = [first_part(w, min(most, w.count)) for w in windows]
         remarks.append(f"Of each stretch the first {most * period:.3g} s are used.")
-    if computed:
-        remarks.append(
-            f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "
-            "the sum; unlike gains of two sensors are looked for in each pair."
-        )
-    elif not has_zero:
-        remarks.append("Two currents only: the third is taken as minus their sum, with what one sensor reads wrong.")
+    remarks += (
+        f"{said}. That tells the sum of R_s and R_R, and L_sigma, and little else: {FREE_IT}."
+        for said in standing_still
+    )
+    remarks += _of_third_current(computed, has_zero)
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
     commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
@@ -209,7 +218,19 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         tuple(windows), period, scales, plate, has_speed, has_zero, commanded, (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
+        tuple(standing_still),
     )  # fmt: skip
+
+
+def _of_third_current(computed: Sequence[str], has_zero: bool) -> Iterator[str]:
+    """A remark where fewer than three currents were measured. `computed`: the files whose third is minus the sum of two."""
+    if computed:
+        yield (
+            f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "
+            "the sum; unlike gains of two sensors are looked for in each pair."
+        )
+    elif not has_zero:
+        yield "Two currents only: the third is taken as minus their sum, with what one sensor reads wrong."
 
 
 def _speed_noise(recordings: Sequence[RunningRecording], plate: Nameplate) -> float:
@@ -449,6 +470,26 @@ def between(x: Array) -> Array:
     out[1] = (3.0 * x[0] + 6.0 * x[1] - x[2]) / 8.0
     out[-2] = (3.0 * x[-1] + 6.0 * x[-2] - x[-3]) / 8.0
     return out
+
+
+def _not_started(window: Window, one: RunningRecording, scales: Scales, has_speed: bool) -> str:
+    """Of a motor that was switched on and does not come up to speed: that it does not; empty for any other."""
+    period = one.sample_period_s
+    if not window.is_from_rest or window.count * period < standing.LEAST_S:
+        return ""
+    settled, part = round(standing.SETTLED_S / period), round(standing.LEAST_S / 5.0 / period)
+    current, voltage = (x[settled:, 0] + 1j * x[settled:, 1] for x in (window.current, window.voltage[::2]))
+    first, last = (
+        float(np.sum(np.real(voltage[k] * np.conj(current[k]))) / np.sum(np.abs(current[k]) ** 2))
+        for k in (slice(part), slice(-part, None))
+    )
+    speed = standing.highest_speed(first, last)
+    if has_speed:
+        speed = max(float(np.abs(window.speed[::2, 0]).max() / scales.frequency_rad_per_s), standing.LEAST_SPEED)
+    if not standing.is_standing(first, last) or speed > standing.MOST_SPEED:
+        return ""
+    rated = float(np.sqrt(np.mean(np.abs(current) ** 2))) / scales.current_a
+    return f"{one.source}: {standing.words(rated, window.count * period, speed)}"
 
 
 def _means(window: Window, period: float) -> tuple[list[float], list[float]]:

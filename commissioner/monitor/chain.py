@@ -18,6 +18,7 @@ from commissioner.monitor.intake.against_plate import (
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.channels import Wiring
 from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.intake.terminals import lost_in_loop_w
 from commissioner.monitor.loads.mean_speed import whole_record_speed
 from commissioner.monitor.loads.mean_torque import whole_record_torque
 from commissioner.monitor.loads.members import members_of, pole_count, with_wobble
@@ -198,6 +199,10 @@ def _invert(
     period = characteristic(audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia)
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     torque, torque_std = whole_record_torque(frame, part, found, fitted, pairs, (torque, torque_std))
+    assert audited.fundamental is not None
+    torque_std = float(
+        np.hypot(torque_std, lost_in_loop_w(audited.fundamental, plate) * pairs / lines.supply_rad_per_s)
+    )
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
     ripple_rad = float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2)))
     whole, whole_std = whole_record_speed(frame, part, found, lines, ripple_rad, fitted)

@@ -99,7 +99,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     covariance = _of_four(fit, whole) + np.outer(by_lag, by_lag)  # a filter or a counter: not known
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
-        raise DataRefused(
+        raise record.refusal_of_standing("identify") or DataRefused(
             f"the recording says nothing about the {worst}", step="identify", value=float(np.sqrt(covariance.diagonal().max())),
             limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque; one steady load is for `commissioner monitor`",
         )  # fmt: skip

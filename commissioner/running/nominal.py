@@ -82,7 +82,7 @@ def require_a_motor(problem: Problem, fit: Fit) -> None:
     off = [abs(np.log(fit.machine.value(n) / v)) for n, v in zip(FOUR, four, strict=True)]
     if fit.chi2 / fit.count > LEAST_CHI2 * 100 or max(off) > np.log(MOST_OFF):
         worst = FOUR[int(np.argmax(off))]
-        raise DataRefused(
+        raise problem.record.refusal_of_standing("fit of four parameters") or DataRefused(
             f"no machine near the plate's values makes these currents: {worst.replace('_', ' ')} would be {fit.machine.value(worst):.3g} (SI)",
             step="fit of four parameters", value=fit.machine.value(worst), limit=f"within {MOST_OFF:g} times {dict(zip(FOUR, four, strict=True))[worst]:.3g}",
             remedy="check the scale and the phase order of currents and voltages, and the plate",

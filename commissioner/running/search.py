@@ -255,7 +255,7 @@ def _shown(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit,
 
 
 def _is_lost(shown: Fit, one: Named) -> bool:
-    """Whether a cause that the currents tell is within one standard deviation of nothing, once the noise of the input is counted."""
+    """Whether a cause that the currents tell is within three standard deviations of nothing, once the noise of the input is counted."""
     at = [shown.place(name) for name in one.form.numbers]
     values = np.array([shown.machine.value(name) for name in one.form.numbers])
     counted, bare = (
@@ -359,7 +359,7 @@ def _tried(seeking: Search, held: Fit, fit: Fit, accepted: tuple[Named, ...]) ->
 
 def least_strength(record: Record) -> float:
     """Strength over noise that a name needs in such a recording."""
-    if record.is_steady:
+    if record.is_steady or record.has_one_load:
         return RULES.material_steady_sigma
     return RULES.material_sigma if record.has_speed else RULES.material_unheld_sigma
 

@@ -10,11 +10,13 @@ import numpy as np
 from commissioner.monitor.intake.findings import Audited, Fundamental
 from commissioner.monitor.signals.quiet import wander
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.running import from_nameplate
+from commissioner.motor.running import from_nameplate, stator_impedance
 
 RESISTANCE_STD, SLIP_STD, IRON_STD = 0.4, 0.25, 0.02
 """Relative: of the plate's stator resistance, of slip over torque (tolerance of IEC 60034-1 and temperature), and of the
 apparent power for iron loss (which light load does not lower) and sensors."""
+NEGATIVE_LEAST = 0.7
+"""Of the plate's impedance at negative sequence, the motor's at least."""
 LEVEL_S, LEVEL_PERIODS = 0.1, 3.0
 """Over which the power has a level: seconds, and supply periods where these are longer (an unbalance pulses with twice the supply)."""
 
@@ -38,6 +40,14 @@ def power_wander_w(audited: Audited) -> float:
     return wander(power, max(round(level_s / audited.sample_period_s), 1))
 
 
+def lost_in_loop_w(seen: Fundamental, plate: Nameplate) -> float:
+    """What a shorted loop may take of the power, none of which is torque: it draws as much current of positive sequence as of negative, and no
+    more of that than the voltages' own unbalance does not drive."""
+    impedance = stator_impedance(from_nameplate(plate), 2.0 * math.pi * seen.frequency_hz, 2.0 - plate.rated_slip)
+    driven = abs(seen.voltage_negative_v) / (NEGATIVE_LEAST * abs(impedance))
+    return 1.5 * abs(seen.voltage_v) * max(abs(seen.current_negative_a) - driven, 0.0)
+
+
 def from_terminals(seen: Fundamental | None, plate: Nameplate, wander_w: float = 0.0) -> Terminals | None:
     """T = (P - 3 R_s I^2) / (omega / p), and the slip that this torque has by the plate; None where no machine draws so. `wander_w`:
     rms of the power's movement within the stretch, which no mean tells."""
@@ -52,7 +62,7 @@ def from_terminals(seen: Fundamental | None, plate: Nameplate, wander_w: float =
     volts = math.sqrt(1.5) * abs(seen.voltage_v)
     rated_apparent = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a
     of_iron = IRON_STD * max(apparent, rated_apparent * (volts / plate.rated_voltage_v) ** 2)
-    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron, wander_w) / synchronous
+    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron, lost_in_loop_w(seen, plate), wander_w) / synchronous
     rated_nm = plate.rated_power_w / (plate.rated_speed_rpm * math.pi / 30.0)
     flux, rated_flux = volts / seen.frequency_hz, plate.rated_voltage_v / plate.rated_frequency_hz
     drop = plate.rated_slip * 2.0 * math.pi * plate.rated_frequency_hz / plate.pole_pairs * torque / rated_nm

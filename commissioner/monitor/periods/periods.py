@@ -64,7 +64,8 @@ class PairSpectrum:
 
 @dataclass(frozen=True)
 class Periodicity:
-    """A comb that was found (or given): frequency over the segment, its standard error, and what speaks for it."""
+    """A comb that was found (or given): frequency over the segment, its standard error, and what speaks for it. `is_told_from_mains`: whether one of
+    its lines lies a period of the segment's length or more from every harmonic of the mains."""
 
     name: str
     frequency_hz: float
@@ -73,6 +74,7 @@ class Periodicity:
     evidence: float
     harmonics_seen: tuple[int, ...]
     drift: PhaseDrift | None = None
+    is_told_from_mains: bool = True
 
 
 def pair_spectrum(vector: Vector, sample_period_s: float, highest_hz: float, full_scale_a: float = 0.0) -> PairSpectrum:

@@ -109,4 +109,14 @@ def too_little(frame: TurningFrame, part: slice, found: Found, search: ShaftSear
             "a line above the noise of its 64 blocks",
             "record longer, at steady load or with better current sensors",
         )
+    if not found.shaft.is_told_from_mains:
+        drop_hz = abs(search.synchronous_hz - found.shaft.frequency_hz)
+        return Finding(
+            "no_shaft_line",
+            "refused",
+            f"the shaft's line, {drop_hz:.2g} +- {found.shaft.frequency_std_hz:.2g} Hz beside the supply's, is not told from it within {length:.2f} s: the slip is not known",
+            drop_hz * length,
+            "a period of the recording's length apart",
+            "record 30-60 s at steady load, or at more load",
+        )
     return None

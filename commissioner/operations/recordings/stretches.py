@@ -14,11 +14,13 @@ from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.channels import Wiring, is_straight_motor
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.intake.states.naming import LEAST_STEADY_S, START_CURRENT
+from commissioner.monitor.intake.states.standing import highest_standing_speed
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import Terminals, from_terminals, power_wander_w
 from commissioner.monitor.loads.pairing_by_start import wired_in
 from commissioner.monitor.partial import OF_MODEL, Partial, of_terminals, refused_audit
 from commissioner.monitor.periods.periods import slip_of
+from commissioner.motor import standing
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
@@ -29,6 +31,8 @@ SILENT = frozenset({"no_period", "no_shaft_line"})
 """Refusals of a stretch that is steady, but too even for the shaft to be seen: a fan, a pump, a healthy coupling."""
 MARGIN_S = 0.06
 """At either end of a steady stretch: the window that finds it reaches so far over its edge."""
+UNFED = frozenset({"off", "residual"})
+"""What precedes a closing."""
 AGREES = 3.0
 """Standard deviations of the terminals' speed within which a line is the shaft's."""
 
@@ -53,7 +57,7 @@ def in_its_states(
         return seen, recording, out
     if not steady:
         return (
-            _not_watched(recording, _never_steady(stretches, plate)),
+            _not_watched(recording, _never_steady(recording, stretches, plate)),
             recording,
             [as_state(s, used=False) for s in stretches],
         )
@@ -94,10 +98,20 @@ def _wired(recording: RunningRecording, stretches: tuple[Stretch, ...], plate: N
     return next((wired for wired in starts if wired is not None), None)
 
 
-def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
-    """A current that is a start's to the end of the recording may as well be another unit's."""
+def _never_steady(recording: RunningRecording, stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
+    """A current that is a start's to the end of the recording may as well be another unit's, where its closing is not in it."""
+    last = stretches[-1]
+    share = last.current_a / plate.rated_current_a
+    has_closed = len(stretches) > 1 and {s.state for s in stretches[:-1]} <= UNFED
+    speed = (
+        highest_standing_speed(cut_out(recording, last, 0.0), plate) if has_closed and last.state == "start" else None
+    )
+    if speed is not None:
+        return Finding(
+            "not_started", "refused", standing.words(share, last.duration_s, speed), share, f"a start within {last.duration_s:.3g} s",
+            "switch off before it burns, look for a blocked shaft, too much load, a low voltage or a wrong connection; of a motor that starts so long, record until it runs",
+        )  # fmt: skip
     if {s.state for s in stretches} == {"start"}:
-        share = stretches[-1].current_a / plate.rated_current_a
         return Finding(
             "current_level", "refused",
             f"the motor starts to the end of the recording, or the currents are in another unit: {share:.3g} times the rated one on the mean",

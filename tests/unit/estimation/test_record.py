@@ -18,6 +18,7 @@ from commissioner.estimation.record import (
 )
 from commissioner.monitor.intake import clock
 from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import from_nameplate, stator_impedance
 from commissioner.records import RunningRecording
 from tests.running_effects.cases import Case, taken
 from tests.running_effects.start import PLATE, started
@@ -228,3 +229,35 @@ def test_flicker_is_no_second_load(start, swing, is_one):
     )  # fmt: skip
     assert prepare([one], plate).has_one_load is is_one
     assert not prepare([recording], plate).has_one_load
+
+
+def closed(slip, has_speed):
+    """The plate's circuit, off to 0.1 s, then at each moment in its steady state at this slip."""
+    t = np.arange(10_000) * 2e-4
+    z = np.array([stator_impedance(from_nameplate(PLATE), 100 * np.pi, s) for s in slip(t)])
+    v = 326.6 * np.exp(100j * np.pi * t + 0.4j) * (t > 0.1)
+    i, u = (tuple((x * np.exp(-2j * np.pi * k / 3)).real for k in range(3)) for x in (v / z, v))
+    return RunningRecording(t, i, u, False, 50 * np.pi * (1.0 - slip(t)) if has_speed else None, 2e-4, {}, "closed.csv")
+
+
+@pytest.mark.parametrize("has_speed", [True, False])
+def test_a_motor_that_does_not_start_is_said_to_stand(has_speed):
+    """All of it was `start`, and nobody said that the shaft stands."""
+    record = prepare([closed(np.ones_like, has_speed)], PLATE)
+    (said,) = record.not_started
+    assert said.startswith("closed.csv: the motor does not start: for 1.9 s") and "no more than 2%" in said
+    assert any(r.startswith(said) and "look at shaft" in r for r in record.remarks)
+    refusal = record.refusal_of_standing("identify")
+    assert isinstance(refusal, DataRefused) and refusal.what == said and "shaft" in refusal.remedy
+
+
+@pytest.mark.parametrize("has_speed", [True, False])
+def test_a_motor_that_starts_is_not_said_to_stand(has_speed):
+    record = prepare(
+        [
+            closed(lambda t: np.interp(t, [0.1, 2.0], [1.0, 0.4]), has_speed),
+            closed(lambda t: np.interp(t, [0.3, 0.6], [1.0, 0.03]), has_speed),
+        ],
+        PLATE,
+    )
+    assert record.not_started == () and record.refusal_of_standing("identify") is None

@@ -1,5 +1,6 @@
-"""Loads that step, build up, drift and swing, and supplies that ramp slowly or step; truth from phasors and closed forms."""
+"""Loads that step, build up, drift and swing, supplies that ramp slowly or step, motors that stand or have a shorted loop; truth from phasors and closed forms."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.chain import Refused, Wishes
+from commissioner.monitor.intake.findings import Fundamental
 from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.intake.states.windows import Levels
+from commissioner.monitor.intake.terminals import from_terminals, lost_in_loop_w
 from commissioner.monitor.loads.mean_torque import whole_record_torque
 from commissioner.monitor.periods import combs
 from commissioner.monitor.periods.periods import SHAFT_SIGNIFICANT, find_peaks_above, pair_spectrum, stands_out
@@ -299,3 +302,62 @@ def test_a_fault_that_turns_the_power_factor_is_no_other_plate_where_the_shaft_i
     )
     seen, _, _ = in_its_states(replace(steady, currents_a=currents), PLATE, Wishes())
     assert isinstance(seen, Refused) and seen.reason.code == code
+
+
+def closed(slip, seconds=4.0, line_to_line=False):
+    """The plate's circuit, off to 0.3 s, then at each moment in its steady state at this slip."""
+    t = np.arange(round(seconds / 5e-4)) * 5e-4
+    z = np.array([stator_impedance(from_nameplate(PLATE), 100 * np.pi, s) for s in np.broadcast_to(slip(t), t.shape)])
+    v = 326.6 * np.exp(100j * np.pi * t) * (t > 0.3)
+    i, u = ([(x * np.exp(-2j * np.pi * k / 3)).real for k in range(3)] for x in (v / z, v))
+    if line_to_line:
+        u = [u[k] - u[(k + 1) % 3] for k in range(3)]
+    return RunningRecording(t, tuple(i), tuple(u), line_to_line, None, 5e-4)
+
+
+@pytest.mark.parametrize("line_to_line", [False, True])
+@pytest.mark.parametrize("last", [1.0, 0.9])
+def test_a_motor_that_does_not_start_is_said_to_stand(last, line_to_line):
+    """It was "never in a steady state", with the remedy of recording longer."""
+    recording = closed(lambda t: np.interp(t, [0.3, 4.0], [1.0, last]), line_to_line=line_to_line)
+    seen, _, _ = in_its_states(recording, PLATE, Wishes())
+    assert seen.reason.code == "not_started" and "the motor does not start: for 3.7 s" in seen.reason.what
+    ohm = abs(stator_impedance(from_nameplate(PLATE), 100 * np.pi, 1.0))
+    assert seen.reason.value == pytest.approx(326.6 / ohm / np.sqrt(2.0) / PLATE.rated_current_a, rel=0.03)
+    said = int(re.search(r"no more than (\d+)%", seen.reason.what)[1]) / 100
+    assert 1.0 - last <= said + 0.005 and said <= 0.02 + 2.0 * (1.0 - last)
+    assert "blocked shaft" in seen.reason.remedy
+
+
+def test_a_motor_that_speeds_up_to_the_end_is_not_said_to_stand():
+    seen, _, _ = in_its_states(closed(lambda t: np.interp(t, [0.3, 4.0], [1.0, 0.4])), PLATE, Wishes())
+    assert seen.reason.code == "no_steady_stretch"
+
+
+LARGE = Nameplate(18500.0, 400.0, 50.0, 31.5, 1472.0, 0.89, 2, "star")
+
+
+def terminals(loop_of_rated: float, unbalance: float = 0.01) -> tuple[Fundamental, float]:
+    """The plate's circuit at rated slip with a resistive loop on phase u, and its air-gap torque."""
+    circuit, omega, v = from_nameplate(LARGE), 100 * np.pi, 326.6 + 0j
+    negative = unbalance * v * np.exp(0.7j)
+    siemens = loop_of_rated * np.sqrt(2.0) * LARGE.rated_current_a / abs(v)
+    healthy = v / stator_impedance(circuit, omega, LARGE.rated_slip)
+    driven = negative / stator_impedance(circuit, omega, 2.0 - LARGE.rated_slip)
+    current, other = healthy + siemens * v / 3.0, driven + siemens * np.conj(v) / 3.0
+    power = 1.5 * v * np.conj(current)
+    torque = (1.5 * (v * np.conj(healthy)).real - 1.5 * circuit.stator_resistance_ohm * abs(healthy) ** 2) * 2 / omega
+    return Fundamental(50.0, v, current, negative, other, power.real, power.imag, False), float(torque)
+
+
+@pytest.mark.parametrize("loop", [0.0, 0.1, 0.4, 1.0])
+def test_what_a_shorted_loop_takes_is_in_the_torques_error(loop: float) -> None:
+    """A loop of 1.0 of the rated current had a torque 50 % too large, 13 stated errors."""
+    seen, torque = terminals(loop)
+    told = from_terminals(seen, LARGE)
+    assert told is not None and abs(told.torque_nm - torque) < 2.0 * told.torque_std_nm
+
+
+@pytest.mark.parametrize("unbalance", [0.0, 0.02, 0.05])
+def test_what_the_mains_unbalance_drives_is_no_loop(unbalance: float) -> None:
+    assert lost_in_loop_w(terminals(0.0, unbalance)[0], LARGE) == 0.0

@@ -120,9 +120,10 @@ def test_a_diagnosis_is_given_up_within_its_first_fit(times):
     assert page_of(seen, document, "start.csv").headline.startswith("Not finished")
 
 
-@pytest.mark.parametrize(("size", "stays"), [(0.5e-2, ()), (2e-2, (IRON,))])
-def test_a_cause_within_one_standard_deviation_of_nothing_is_no_name(problem, monkeypatch, size, stays):
-    """A healthy motor behind a filtered inverter had a delay of -17 +- 480 us, 0.99 sure: 480 was what the carrier in the voltage makes."""
+@pytest.mark.parametrize(("size", "stays"), [(0.5e-2, ()), (2e-2, ()), (4e-2, (IRON,))])
+def test_a_cause_within_three_standard_deviations_of_nothing_is_no_name(problem, monkeypatch, size, stays):
+    """A healthy motor behind a filtered inverter had a delay of -17 +- 480 us, 0.99 sure: 480 was what the carrier in the voltage makes; another, under a
+    load that ripples, a voltage gain of 0.028 +- 0.014 %."""
     fit = fit_of(problem, 1000.0, iron_conductance=size)
     seeking = searching(problem, monkeypatch)
     aside = np.array([[1e-2]])
