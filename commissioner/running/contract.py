@@ -52,7 +52,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
         },
         "parameters_before": _quantities(seen.parameters_before),
         "parameters_after": _quantities(seen.parameters_after, seen.stator_flux_wb),
-        "below_materiality": [],
+        "below_materiality": list(dict.fromkeys(t.cause.cause for t in found.trifles)) if found else [],
         "detection_limits": _limits(seen),
         "cannot_tell": list(NEVER_NAMEABLE) if found else [],
         "left_by_state_over_noise": dict(left.by_state) if left else {},

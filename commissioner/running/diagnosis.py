@@ -136,6 +136,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         causes = ()
         verdict, reason = _verdict(causes, left, gain)
     remarks += _left_open(found) if causes else ()
+    remarks += _of_trifles(found)
     if not found.is_complete:
         remarks.append(NO_LIMIT)
         if seen := ", ".join(so_far(found.steps)):
@@ -152,10 +153,39 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     if is_saturated(found.fit.machine.values()):
         saturated = _with_errors(found.fit, lambda values: at_flux(record, values))
     return Diagnosis(
-        verdict, reason, causes, gain, left, _parameters(found.nominal), {**_parameters(found.fit), **saturated},
+        verdict, reason, causes, gain, left, _parameters(found.nominal), _with_trifles(found, {**_parameters(found.fit), **saturated}),
         next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record) if found.is_complete else None,
         found, record, tuple(remarks), stator_flux_wb=abs(stator_flux_wb(record, found.fit.machine.values())) if saturated else None,
     )  # fmt: skip
+
+
+def _with_trifles(found: Found, told: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """The parameters, what is too small to be named and moves them counted as an error of theirs."""
+    values = {name: q.value for name, q in _parameters(found.fit).items()}
+    out = dict(told)
+    for trifle in found.trifles:
+        for name, moved in _parameters(trifle.fit).items():
+            if name in out:
+                shift = moved.value - values[name]
+                out[name] = Quantity(out[name].value, max(out[name].std, float(np.hypot(told[name].std, shift))))
+    return out
+
+
+def _of_trifles(found: Found) -> Iterator[str]:
+    """What is too small to be named, and what it would move most."""
+    if not found.trifles:
+        return
+    names = ", ".join(dict.fromkeys(t.cause.cause.replace("_", " ") for t in found.trifles))
+    strength = max(np.sqrt(t.gain / t.fit.count) for t in found.trifles)
+    values = {name: q.value for name, q in _parameters(found.fit).items() if q.value}
+    moved = [
+        (q.value / values[k] - 1.0, k) for t in found.trifles for k, q in _parameters(t.fit).items() if k in values
+    ]
+    share, most = max(moved, key=lambda one: abs(one[0]))
+    yield (
+        f"Too small to be named from these data, at most {strength:.2g} of the noise: {names}. If one of them is there, "
+        f"{most.rpartition('_')[0].replace('_', ' ')} is up to {share:+.1%} from what is told; the standard deviations hold that."
+    )
 
 
 def _left_open(found: Found) -> Iterator[str]:

@@ -56,6 +56,7 @@ class Step:
 WORSE = "what was held out gets worse"
 BEYOND = "its size is one that physics does not allow"
 OF_NOISE = "noise of the voltage alone may make all of it"
+TRIFLE = "too small to matter"
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,8 @@ class Found:
     limits: dict[str, float]
     steps: tuple[Step, ...]
     is_complete: bool
+    trifles: tuple[Tried, ...] = ()
+    """What beside them gains enough, is surely there, and is too small to be named."""
 
 
 @dataclass
@@ -115,6 +118,8 @@ class Search:
     excluded: frozenset[str]
     observe: Callable[[Step], None]
     steps: list[Step] = field(default_factory=list)
+    trifles: tuple[Tried, ...] = ()
+    """Of the last round: what was too small to matter."""
 
     def say(self, step: Step) -> None:
         """Remember, and tell who listens."""
@@ -218,6 +223,7 @@ def _found(seeking: Search) -> Found:
         _limits(seeking, fit, accepted),
         tuple(seeking.steps),
         is_complete=True,
+        trifles=_surely_there(seeking, accepted),
     )
 
 
@@ -252,6 +258,13 @@ def _shown(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit,
             seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale, why))
             return _shown(seeking, refreshed(seeking.problem, less), others)
     return (fit if beyond else shown), fit, accepted
+
+
+def _surely_there(seeking: Search, accepted: tuple[Named, ...]) -> tuple[Tried, ...]:
+    """The trifles that the noise of the input does not make, without what it does to their fits."""
+    named = {one.cause for one in accepted}
+    freed = (replace(t, fit=unbiased(seeking.problem, t.fit)) for t in seeking.trifles if t.cause.cause not in named)
+    return tuple(t for t in freed if not _is_lost(t.fit, t.cause) and seeking.is_plausible(t.fit, (t.cause,)))
 
 
 def _is_lost(shown: Fit, one: Named) -> bool:
@@ -311,6 +324,7 @@ def _forward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fi
             seeking.accept(one)
             return refreshed(seeking.problem, one.fit), (*accepted, one.cause)
         seeking.say(Step("refused", one.cause.cause, one.cause.form.name, one.gain / one.fit.scale, one.why))
+    seeking.trifles = tuple(t for t in tried if t.why == TRIFLE)
     return None
 
 
@@ -365,8 +379,9 @@ def least_strength(record: Record) -> float:
 
 
 def least_promise(record: Record, count: int, scale: float) -> float:
-    """Linear gain, in chi-square of so many samples, below which no refit would end in a name."""
-    material = least_strength(record) ** 2 * count
+    """Linear gain, in chi-square of so many samples, below which no refit would end in a name, or at one load in what moves a parameter
+    though it is none."""
+    material = 0.0 if record.has_one_load else least_strength(record) ** 2 * count
     return max(RULES.promising * RULES.least_gain * scale, RULES.promising_material * material)
 
 
@@ -379,7 +394,7 @@ def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[
     if gain < RULES.least_share * max(seeking.base.chi2 - fit.chi2, 0.0) and not is_all_of_it:
         return "gains less than what the laws of the accepted causes leave"
     if np.sqrt(gain / fit.count) < least_strength(seeking.problem.record):
-        return "too small to matter"
+        return TRIFLE
     if not seeking.is_plausible(other, causes):
         return BEYOND
     worse = other.held - held.held

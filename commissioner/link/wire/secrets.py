@@ -12,8 +12,9 @@ from commissioner.link.wire.url import USERINFO, without_secrets
 
 HIDDEN = "***"
 _OPTION = re.compile(
-    r"--?[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?", re.IGNORECASE | re.DOTALL
+    r"--?(?![\w-]*-file\b)[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?", re.IGNORECASE | re.DOTALL
 )
+"""An option that holds a secret; the file that one is read from is none."""
 _TLS_FILE = re.compile(
     r"[?&](?:c|%63)(?:e|%65)(?:r|%72)(?:t|%74)=([^&]+)|[?&](?:k|%6b)(?:e|%65)(?:y|%79)=([^&]+)", re.IGNORECASE
 )

@@ -76,7 +76,7 @@ def must_be_findable(wanted: Wanted) -> None:
     """UsageError: a date that is none, an outcome that no run has; an empty list would say that there is no such run."""
     if wanted.outcome and wanted.outcome not in STANDINGS:
         raise UsageError(
-            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(STANDINGS), remedy="give --outcome one of these",
+            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(STANDINGS), remedy="ask for one of these",
         )  # fmt: skip
     for name in ("since", "until"):
         _check_date(getattr(wanted, name), name)

@@ -76,6 +76,11 @@ def _move(source: Path, target: Path, names: Sequence[str]) -> tuple[Moved, ...]
             "source and target are the same archive", step="move runs", value=str(target), limit="two archives",
             remedy="give another folder",
         )  # fmt: skip
+    if target.exists() and not target.is_dir():
+        raise UsageError(
+            f"{target} is a file, no archive", step="move runs", value=str(target), limit="a folder of runs, or none yet",
+            remedy="give another folder",
+        )  # fmt: skip
     folders = [find_folder(source, name) for name in names] if names else run_folders(source)
     try:
         target.mkdir(parents=True, exist_ok=True)

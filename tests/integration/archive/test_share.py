@@ -158,10 +158,12 @@ def test_the_shares_index_knows_what_came(root, tmp_path):
     assert [row.run for row in find(target, Wanted()).rows] == [run.run for run in read_runs(target)]
 
 
-@pytest.mark.parametrize("target", ["https://host/runs", "same"])
-def test_a_target_that_is_none_is_one_clear_failure(root, target):
+@pytest.mark.parametrize("target", ["https://host/runs", "same", "a file"])
+def test_a_target_that_is_none_is_one_clear_failure(root, tmp_path, target):
+    file = tmp_path / "file.txt"
+    file.touch()
     with pytest.raises(UsageError):
-        share.push(root, str(root) if target == "same" else target)
+        share.push(root, {"same": str(root), "a file": str(file)}.get(target, target))
 
 
 def test_links_are_not_followed(root, tmp_path):
