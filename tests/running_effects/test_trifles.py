@@ -14,7 +14,7 @@ R_S = "stator_resistance_ohm"
 
 @pytest.mark.parametrize(("seed", "size"), [(3, 0.006), (5, 0.02)])
 def test_a_turn_fault_that_one_load_does_not_name_is_in_the_error_of_the_resistance(seed, size):
-    """A shorted loop of 0.6 % and 2 % of rated current: R_s was 8 and 68 % off, five and fifty stated errors, and no word of it."""
+    """A shorted loop of 0.6 % and 2 % of rated current: R_s was 8 and 68 % off, more than three and 47 stated errors, and no word of it."""
     scenario = draw(seed, "one", "steady", "stator_asymmetry")
     scenario = replace(scenario, effects=(replace(scenario.effects[0], size=size),))
     recording, plate, _ = taken(scenario, seed)

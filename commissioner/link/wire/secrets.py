@@ -12,7 +12,8 @@ from commissioner.link.wire.url import USERINFO, without_secrets
 
 HIDDEN = "***"
 _OPTION = re.compile(
-    r"--?(?![\w-]*-file\b)[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?", re.IGNORECASE | re.DOTALL
+    r"--?(?![\w-]*-file\b)[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?",
+    re.IGNORECASE | re.DOTALL,
 )
 """An option that holds a secret; the file that one is read from is none."""
 _TLS_FILE = re.compile(

@@ -170,7 +170,9 @@ def test_a_call_without_arguments_ends_in_the_help_and_a_version_is_told(capsys,
 def test_the_last_argument_hides_its_secret_and_an_option_without_one_hides_nothing():
     assert Secrets(["check", "--password"]).hide("check") == "check"
     assert Secrets(["--password", "hunter2"]).hide("with hunter2") == "with ***"
-    assert Secrets(["--password-file", "missing.txt"]).hide("missing.txt cannot be used") == "missing.txt cannot be used"
+    assert (
+        Secrets(["--password-file", "missing.txt"]).hide("missing.txt cannot be used") == "missing.txt cannot be used"
+    )
     assert Secrets([]).hide("anything") == "anything"
 
 
