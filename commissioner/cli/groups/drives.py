@@ -13,7 +13,7 @@ from commissioner.cli.options import Json
 drives_app = typer.Typer(
     cls=Verbs,
     no_args_is_help=True,
-    help="Drive files: list, show, validate; conformance of firmware to the commissioning map.",
+    help="Drive files: list, show, validate, new; conformance of firmware to the commissioning map.",
 )
 
 

@@ -16,9 +16,9 @@ from commissioner.records import RPM
 from commissioner.report.sheet.numbers import half_width
 
 SHOWN = (
-    ("R_s", "stator_resistance_ohm", 1, "ohm"),
-    ("R_R", "rotor_resistance_ohm", 1, "ohm"),
-    ("L_sigma", "leakage_inductance_h", 1e3, "mH"),
+    ("R_s", "stator_resistance_ohm", 1, "Ω"),
+    ("R_R", "rotor_resistance_ohm", 1, "Ω"),
+    ("L_σ", "leakage_inductance_h", 1e3, "mH"),
     ("L_M", "magnetizing_inductance_h", 1e3, "mH"),
 )
 
@@ -125,7 +125,7 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
             + (": " + ", ".join(in_words(name)[0] for name in verdict.names) if verdict.names else "")
         )
     for name, path in document.get("files", {}).items():
-        out.print(f"[dim]{name}[/] {text(path)}")
+        out.print(f"[dim]{name.replace('_', ' '):<22}[/]{text(path)}", soft_wrap=True)
 
 
 def _shaft(seen: Observation, waveforms: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -172,4 +172,5 @@ def _motor(seen: Observation, parameters: Mapping[str, Any]) -> None:
         (short, quantity(parameters[key]["value"] * scale, parameters[key]["std"] * scale, unit))
         for short, key, scale, unit in SHOWN
     ]
-    out.print(table(f"Motor (inverse-Gamma; start: {seen.start.origin})", ("", ""), rows))
+    out.print(f"[bold]Motor[/] (inverse Γ; start: {text(seen.start.origin)})")
+    out.print(table("", ("", "± is 95 %"), rows))

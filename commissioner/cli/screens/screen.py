@@ -12,12 +12,13 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any, Literal
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
 from commissioner.cli.console import spelled
+from commissioner.cli.screens.sentence import Sentence
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.motor.quantities import FIVE
@@ -34,7 +35,14 @@ class Terminal(Console):
     """Obeys markup alone: a control character in any sentence, from wherever it comes, only shows."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        return super().render_str(spelled("\n".join(map(visible, text.split("\n"))), self.encoding), **options)
+        return Sentence.of(
+            super().render_str(spelled("\n".join(map(visible, text.split("\n"))), self.encoding), **options)
+        )
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """As rich's; a sentence alone stays one (in company rich joins them to a plain text)."""
+        alone = len(objects) == 1 and isinstance(objects[0], str)
+        super().print(*((Group(self.render_str(objects[0])),) if alone else objects), **options)
 
     def on_broken_pipe(self) -> None:
         """Nobody reads any more (`| head`): silent from here on, and the verb ends with its own exit code."""
@@ -188,6 +196,21 @@ _MARKS = {
 }
 
 
+OUTCOME_WIDTH, NARROW = 14, 100
+"""Of `commissioned` with its mark; of a terminal on which the columns share too little, and words would break."""
+
+
+def outcome_width(header: Sequence[str]) -> Mapping[int, int]:
+    """`widths` of a table with a column `outcome`: where the terminal is narrow its words stay whole."""
+    return {header.index("outcome"): OUTCOME_WIDTH} if out.width < NARROW else {}
+
+
+def outcome_cell(standing: str) -> str:
+    """As `outcome_mark`, in a column of `outcome_width`."""
+    mark = outcome_mark(standing)
+    return mark.replace("commissioned, ", "commissioned\n") if out.width < NARROW else mark
+
+
 def outcome_mark(standing: str) -> str:
     """The outcome in its colour; a run that was cut off is red."""
     return _MARKS.get(standing, f"[red]? {text(standing)}[/]")
@@ -215,8 +238,9 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
         for remark in (*finding_sentences(document), *document.get("remarks", ())):
             out.print(f"  [dim]•[/] {escape(signs(remark))}")
         if standing(document) == ACCEPTED:
+            again = "" if document.get("tune") else f"`commissioner write-back {escape(str(document['run']))}` or "
             out.print(
-                "  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones"
+                f"  [dim]•[/] the drive still holds its old values; {again}the same call with --write-back writes the new ones"
             )
     out.print(f"  energised {seconds(document['energised_s'], ' in all')}")
 

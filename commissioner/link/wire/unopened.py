@@ -29,7 +29,7 @@ def unopened(url: DriveUrl, error: Exception, limit: str) -> LinkUnreachable:
     what, remedy = (
         _of_serial(url, error) if isinstance(url, RtuUrl) else (f"no connection to {url}", _of_network(error))
     )
-    return LinkUnreachable(what, step="connect", value=str(error), limit=limit, remedy=remedy)
+    return LinkUnreachable(what, step="connect", value=_said(error), limit=limit, remedy=remedy)
 
 
 def certificate_remedy(error: ssl.SSLCertVerificationError, otherwise: str) -> str:
@@ -80,6 +80,12 @@ def _of_serial(url: RtuUrl, error: Exception) -> tuple[str, str]:
             "close the other program; on Linux this user must be in the port's group, often dialout",
         )
     return f"no connection to {url}", "check the adapter, the cable and that no other master holds the line"
+
+
+def _said(error: Exception) -> str:
+    """In words: termios' error is a bare pair of number and words, which would be shown as one."""
+    is_pair = len(error.args) == 2 and not isinstance(error, OSError)
+    return str(error.args[1]) if is_pair else str(error)
 
 
 def _number(error: BaseException | None) -> int | None:

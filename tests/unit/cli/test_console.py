@@ -103,3 +103,38 @@ def test_columns_stay_in_line_where_signs_are_spelled_out():
         lines = raw.getvalue().decode("cp1252").splitlines()
     assert "L_sigma" in lines[1]
     assert lines[1].index("21.5 ohm") == lines[2].index("3.7 mH")
+
+
+def laid(width, *sentences):
+    console = screen.Terminal(width=width, file=io.StringIO(), highlight=False)
+    for sentence in sentences:
+        console.print(sentence)
+    return console.file.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("width", [40, 80])
+@pytest.mark.parametrize(
+    ("begin", "beside"), [("  [dim]•[/] ", 4), ("    ", 4), ("  [dim]remedy [/]", 9), ("✓ ", 2), ("", 0)]
+)
+def test_a_line_goes_on_below_its_own_beginning(width, begin, beside):
+    first, *others = laid(width, begin + "word " * 40)
+    assert others and all(len(line) <= width for line in (first, *others))
+    assert all(line.startswith(" " * beside + "word") for line in others)
+    assert sum(line.count("word") for line in (first, *others)) == 40
+
+
+@pytest.mark.parametrize("quantity", ["4.6 s", "26.33 mH", "125 Hz", "± 0.142 %", "1436 1/min", "2.18 Ω"])
+def test_a_number_stays_with_its_unit_wherever_the_line_ends(quantity):
+    for width in range(20, 60):
+        lines = laid(width, f"  • a longer test would then take {quantity} instead of {quantity}, no more than that")
+        assert sum(line.count(quantity) for line in lines) == 2, lines
+        assert "\ue000" not in "".join(lines)
+    assert quantity in "\n".join(
+        laid(60, screen.table("", ("a", "b"), [("word " * 6, f"of it {quantity} are left " * 2)]))
+    )
+
+
+def test_a_path_in_a_line_that_nothing_may_cut_stays_whole():
+    console = screen.Terminal(width=20, file=io.StringIO(), highlight=False)
+    console.print("report    " + "runs/" * 20 + "report.html", soft_wrap=True)
+    assert console.file.getvalue().count("\n") == 1

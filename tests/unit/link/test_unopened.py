@@ -40,6 +40,7 @@ def test_settings_that_a_line_does_not_take():
     failure = unopened(parse_url("rtu:///dev/pts/7"), Exception(errno.EINVAL, "Invalid argument"), "an open line")
     assert failure.what == "/dev/pts/7 does not take 19200 Bd with even parity"
     assert "parity=N" in failure.remedy
+    assert failure.value == "Invalid argument", "no pair of number and words"
 
 
 @pytest.mark.parametrize("number", [errno.EBUSY, errno.EAGAIN])

@@ -62,13 +62,14 @@ def _list(archive: Archive, *, as_json: bool) -> None:
     if as_json:
         screen.emit(KnownMotors(motors=found))
         return
+    has_serials = any(one.serial for one in found)
     rows = [
-        (screen.text(one.motor or "nobody said"), screen.text(one.serial), screen.text(one.plate), screen.text(one.drive), str(one.runs),
-         one.last_utc[:10], screen.outcome_mark(one.last_standing))
+        (screen.text(one.motor or "nobody said"), *([screen.text(one.serial)] if has_serials else []), screen.text(one.plate),
+         screen.text(one.drive), str(one.runs), one.last_utc[:10], screen.outcome_cell(one.last_standing))
         for one in found
     ]  # fmt: skip
-    header = ("motor", "serial number", "plate", "drive", "runs", "last", "outcome")
-    screen.out.print(screen.table("", header, rows, right=(4,)))
+    header = ("motor", *(["serial number"] if has_serials else []), "plate", "drive", "runs", "last", "outcome")
+    screen.out.print(screen.table("", header, rows, right=(header.index("runs"),), widths=screen.outcome_width(header)))
 
 
 def _judge(archive: Archive, run: str, *, as_json: bool) -> None:

@@ -29,10 +29,6 @@ def find(archive: Archive, wanted: Wanted, limit: int | None, out: Path | None, 
         list_runs(archive, as_json=as_json, wanted=wanted)
 
 
-OUTCOME_WIDTH, NARROW = 14, 100
-"""Of `commissioned` with its mark; of a terminal on which the columns share too little, and words would break."""
-
-
 def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
     """The runs that are wanted, newest first."""
     found = find_runs(archive, wanted)
@@ -45,13 +41,13 @@ def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
         )
         return
     rows = [
-        (screen.text(row.run), screen.outcome_mark(row.standing), screen.text(row.motor or row.plate), screen.text(row.drive),
+        (screen.text(row.run), screen.outcome_cell(row.standing), screen.text(row.motor or row.plate), screen.text(row.drive),
          screen.text(row.person), row.holds)
         for row in found.rows
     ]  # fmt: skip
     header = ("run", "outcome", "motor", "drive", "person", "holds")
     told = len(header) if any(row[-1] for row in rows) else len(header) - 1
-    least = {1: OUTCOME_WIDTH} if screen.out.width < NARROW else {}
+    least = screen.outcome_width(header)
     screen.out.print(screen.table("", header[:told], [row[:told] for row in rows], widths=least))
     if (more := found.total - len(rows)) > 0:
         screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")

@@ -32,11 +32,12 @@ def conformance(
         energise=energise,
         only=rules,
         reply_timeout_s=reply_timeout_s,
-        on_result=_keep_quiet if as_json else _show,
+        on_result=_keep_quiet if as_json else _show_tried,
     )
     if as_json:
         screen.emit(as_document(done))
     else:
+        _show_unenergised(done)
         screen.out.print(f"[bold]{_counts(done)}[/]")
     if not done.conforms:
         raise SystemExit(SOME_FAILED)
@@ -92,6 +93,29 @@ def _counts(done: Conformance) -> str:
 
 def _keep_quiet(_: RuleResult) -> None:
     """With --json nothing but the document goes to stdout."""
+
+
+def _show_tried(result: RuleResult) -> None:
+    """Each rule as it ends, but for those that wait for a voltage: they mostly share one reason, which is said once."""
+    if not _is_unenergised(result):
+        _show(result)
+
+
+def _is_unenergised(result: RuleResult) -> bool:
+    return result.energises and result.outcome is Outcome.NOT_TESTED
+
+
+def _show_unenergised(done: Conformance) -> None:
+    """The rules that would have put a voltage on the motor, under the reason why none was put."""
+    by_reason: dict[str, list[RuleResult]] = {}
+    for result in filter(_is_unenergised, done.results):
+        by_reason.setdefault(result.reason, []).append(result)
+    for reason, results in by_reason.items():
+        if len(results) == 1:
+            _show(results[0])
+            continue
+        screen.out.print(f"{MARKS[Outcome.NOT_TESTED]} {len(results)} rules not tested: {escape(reason)}")
+        screen.out.print(f"    [dim]{', '.join(result.name for result in results)}[/]")
 
 
 def _show(result: RuleResult) -> None:
