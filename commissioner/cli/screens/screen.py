@@ -41,8 +41,10 @@ class Terminal(Console):
 
     def print(self, *objects: Any, **options: Any) -> None:
         """As rich's; a sentence alone stays one (in company rich joins them to a plain text)."""
-        alone = len(objects) == 1 and isinstance(objects[0], str)
-        super().print(*((Group(self.render_str(objects[0])),) if alone else objects), **options)
+        if len(objects) == 1 and isinstance(objects[0], str) and not options.get("soft_wrap"):
+            read = {name: options[name] for name in ("markup", "emoji", "highlight") if name in options}
+            objects = (Group(self.render_str(objects[0], **read)),)
+        super().print(*objects, **options)
 
     def on_broken_pipe(self) -> None:
         """Nobody reads any more (`| head`): silent from here on, and the verb ends with its own exit code."""
