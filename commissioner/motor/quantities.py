@@ -36,6 +36,11 @@ FOUR = FIVE[:4]
 FIELDS = tuple(q.field for q in FIVE)
 
 
+def field_name(field: str) -> str:
+    """`stator resistance R_s` of `stator_resistance_ohm`; another name as it is."""
+    return next((q.name for q in FIVE if q.field == field), field)
+
+
 def in_shown_unit(field: str, *values: float) -> str:
     """SI values of one of the five as people read them: `214 mH`, `4 ... 90 mH`."""
     quantity = next(q for q in FIVE if q.field == field)

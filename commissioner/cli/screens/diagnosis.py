@@ -17,7 +17,6 @@ from commissioner.report.diagnosis.names import (
     main_quantity,
     members,
     said,
-    spoken,
     sure_words,
 )
 from commissioner.report.diagnosis.numbers import PLUS_MINUS, limit_words, number, part_word, sure
@@ -30,6 +29,7 @@ from commissioner.report.diagnosis.words import (
     remarks,
     tone,
 )
+from commissioner.report.sheet.words import cause_name
 
 COLOURS = {"good": "green", "warn": "yellow", "bad": "red"}
 COMMON = tuple(sorted(name for name, cause in CATALOGUE.items() if cause.is_common))
@@ -120,10 +120,10 @@ def _uncertain(document: Mapping[str, Any]) -> None:
     if seen:
         screen.print("[bold]seen, but the name is uncertain[/]")
     for one in seen:
-        screen.print(f"  {spoken(one['name'])}: {escape(one['decides'])}")
+        screen.print(f"  {cause_name(one['name'])}: {escape(one['decides'])}")
     if hidden:
         screen.print(
-            f"[dim]not seen, but could hide behind a named cause: {', '.join(spoken(u['name']) for u in hidden)}[/]"
+            f"[dim]not seen, but could hide behind a named cause: {', '.join(cause_name(u['name']) for u in hidden)}[/]"
         )
 
 
@@ -143,4 +143,4 @@ def _limits(document: Mapping[str, Any]) -> str:
     known = document.get("detection_limits", {})
     apart = {u["name"] for u in document.get("uncertain", ())} | {n for c in document["causes"] for n in members(c)}
     names = [n for n in dict.fromkeys((*COMMON, *known)) if n in known and n not in apart]
-    return ", ".join(f"{spoken(n)} from {limit_words(document, n)}" for n in names[:MOST_LIMITS])
+    return ", ".join(f"{cause_name(n)} from {limit_words(document, n)}" for n in names[:MOST_LIMITS])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.search.journal import Accepted, Dropped, Nominal, Said, Tried
-from commissioner.report.diagnosis.names import said, spoken
+from commissioner.report.diagnosis.names import said
+from commissioner.report.sheet.words import cause_name
 
 BEGIN = "comparing with a plain simulation, then trying the causes; this takes from seconds to some minutes"
 
@@ -38,11 +39,11 @@ class Progress:
             case Tried(name=name) if name not in self.tried:
                 self.tried.append(name)
                 count = f"{len(self.tried)} of {len(CATALOGUE)} causes looked likely enough so far"
-                return f"trying {spoken(name)} ...  ({count})"
+                return f"trying {cause_name(name)} ...  ({count})"
             case Accepted(name=name):
-                return f"{spoken(name)} helps"
+                return f"{cause_name(name)} helps"
             case Dropped(name=name, is_taken=True):
-                return f"{spoken(name)} is no longer needed"
+                return f"{cause_name(name)} is no longer needed"
             case Said(sentence=sentence):
                 return said(sentence.strip())
             case _:

@@ -8,10 +8,11 @@ from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.verdict.collinearity import Alike
 from commissioner.diagnose.verdict.residuals import Residuals
 from commissioner.report.diagnosis import figures
-from commissioner.report.diagnosis.names import class_name, spoken
+from commissioner.report.diagnosis.names import class_name
 from commissioner.report.diagnosis.words import Document
 from commissioner.report.page import Folded, Picture, Section, picture
 from commissioner.report.sheet.marks import capitalised
+from commissioner.report.sheet.words import cause_name
 
 
 def where(document: Document, left: Residuals, has_causes: bool) -> Section:
@@ -67,7 +68,7 @@ def for_experts(document: Document, left: Residuals, has_causes: bool, alike: Al
             )
         )
     if alike.alone:
-        same.append(f"Like no other cause in this recording: {', '.join(map(spoken, alike.alone))}.")
+        same.append(f"Like no other cause in this recording: {', '.join(map(cause_name, alike.alone))}.")
     tie: list[str | Picture] = [
         picture(
             figures.correlation(left.correlation, has_causes),

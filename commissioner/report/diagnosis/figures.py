@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from commissioner.diagnose.verdict.collinearity import Alike
 from commissioner.diagnose.verdict.residuals import Correlation, Residuals, Spectrum
 from commissioner.motor.circuit import QUANTILE
-from commissioner.report.diagnosis.names import spoken
 from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, plain_decades, told_apart
+from commissioner.report.sheet.words import cause_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -162,7 +162,7 @@ def look_alikes(seen: Alike, named: Sequence[str]) -> Figure:
     figure = _figure(min(1.9 + 0.27 * count, 6.0), width=min(3.4 + 0.38 * count, TOTAL_WIDTH))
     axes = figure.subplots()
     axes.imshow(seen.share, cmap="Blues", vmin=0.0, vmax=1.15, aspect="auto")
-    words = [spoken(n) for n in seen.names]
+    words = [cause_name(n) for n in seen.names]
     axes.set_xticks(range(count), words, rotation=40, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(count), words)
     for label, name in zip([*axes.get_xticklabels(), *axes.get_yticklabels()], seen.names * 2, strict=True):

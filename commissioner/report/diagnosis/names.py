@@ -8,22 +8,16 @@ from typing import Any
 from commissioner.diagnose.causes import CATALOGUE, TOGETHER, between
 from commissioner.diagnose.causes.cause import AsOne, Words
 from commissioner.report.diagnosis.numbers import PLAIN_NUMBERS, quantity, short, sure
-from commissioner.report.sheet.words import quantity_name
+from commissioner.report.sheet.words import cause_name, quantity_name
 
 Cause = Mapping[str, Any]
 COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 
 
-def spoken(name: str) -> str:
-    """`dc_link_sag` as `DC link sag`."""
-    words = name.replace("_", " ")
-    return f"DC{words[2:]}" if words.startswith("dc ") else words
-
-
 def said(text: str) -> str:
     """A sentence with the catalogue's names as people say them."""
     for name in sorted(CATALOGUE, key=len, reverse=True):
-        text = text.replace(name, spoken(name))
+        text = text.replace(name, cause_name(name))
     return text
 
 
@@ -48,7 +42,7 @@ def class_name(cause: Cause) -> str:
     words = one.words if one else _own_words(cause)
     if words.called:
         return words.called
-    return " or ".join(spoken(n) for n in (cause["name"], *cause["equivalent"]))
+    return " or ".join(cause_name(n) for n in (cause["name"], *cause["equivalent"]))
 
 
 def listed(names: list[str]) -> str:

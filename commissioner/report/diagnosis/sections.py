@@ -7,7 +7,7 @@ from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.motor.quantities import FIVE, Quantity
-from commissioner.report.diagnosis.names import Cause, class_name, plain_of, size_words, spoken, sure_words
+from commissioner.report.diagnosis.names import Cause, class_name, plain_of, size_words, sure_words
 from commissioner.report.diagnosis.numbers import PLUS_MINUS, chance, limit_words, number, part_of_error, percent
 from commissioner.report.diagnosis.words import (
     Document,
@@ -22,6 +22,7 @@ from commissioner.report.diagnosis.words import (
 )
 from commissioner.report.page import Section, Table, Tone
 from commissioner.report.sheet.marks import coded
+from commissioner.report.sheet.words import cause_name
 
 SURE = 0.8
 """Names below this probability are marked."""
@@ -104,7 +105,7 @@ def _best_alternative(cause: Cause) -> str:
         return "none near"
     name, loss = min(worse.items(), key=lambda item: item[1])
     kept = 1.0 - loss / cause["delta_chi2"]
-    return f"{spoken(name)}, {percent(kept)} of it" if kept > 0.0 else "none near"
+    return f"{cause_name(name)}, {percent(kept)} of it" if kept > 0.0 else "none near"
 
 
 def uncertain_names(document: Document) -> list[Section]:
@@ -115,7 +116,7 @@ def uncertain_names(document: Document) -> list[Section]:
         ("Not seen, but could hide behind a named cause", False),
     ):
         rows = [
-            (spoken(u["name"]), u["why"], coded(u["decides"]))
+            (cause_name(u["name"]), u["why"], coded(u["decides"]))
             for u in document.get("uncertain", ())
             if u["is_seen"] is is_seen
         ]
@@ -143,7 +144,7 @@ def not_found(document: Document) -> Section:
     apart = {c["name"] for c in document["causes"]} | {n for c in document["causes"] for n in c["equivalent"]}
     apart |= {u["name"] for u in document.get("uncertain", ())}
     rows = [
-        (spoken(k), limit_words(document, k), coded(CATALOGUE[k].decides if k in CATALOGUE else ""))
+        (cause_name(k), limit_words(document, k), coded(CATALOGUE[k].decides if k in CATALOGUE else ""))
         for k in document["detection_limits"]
         if k not in apart
     ]

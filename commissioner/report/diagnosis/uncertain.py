@@ -10,8 +10,8 @@ from commissioner.diagnose.contract import UncertainName
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.verdict.collinearity import Alike, look_alikes
 from commissioner.diagnose.verdict.experiment import what_decides
-from commissioner.report.diagnosis.names import spoken
 from commissioner.report.diagnosis.numbers import number, percent
+from commissioner.report.sheet.words import cause_name
 
 SAME_FORM = 0.96
 """From this share on one cause makes the error of another, and only another test tells the two apart."""
@@ -54,7 +54,7 @@ def _hidden(alike: Alike, named: Collection[str]) -> dict[str, str]:
         same = np.maximum(alike.share[mine, k], alike.share[k, mine])
         if same.max() >= SAME_FORM:
             out[name] = (
-                f"Not seen by itself, but it could hide behind {spoken(alike.names[mine[int(same.argmax())]])}: "
+                f"Not seen by itself, but it could hide behind {cause_name(alike.names[mine[int(same.argmax())]])}: "
                 f"{percent(min(float(same.max()), 0.9999))} the same error in these data."
             )
     return out

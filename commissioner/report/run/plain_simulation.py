@@ -13,6 +13,7 @@ from commissioner.report.sheet import marks
 from commissioner.report.sheet.drawing import Panel
 from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import digits, half_width, signed, with_interval
+from commissioner.report.sheet.words import cause_name
 
 _MOST_LIMITS = 30
 _SHOWN: Mapping[str, tuple[tuple[float, str], ...]] = {
@@ -81,7 +82,7 @@ def _lead(diagnosis: Record) -> Text:
 
 
 def _cause(cause: Record) -> tuple[Text, ...]:
-    names = [cause.get("title") or _words(cause["name"]), *(_words(other) for other in cause["equivalent"])]
+    names = [cause.get("title") or cause_name(cause["name"]), *(cause_name(other) for other in cause["equivalent"])]
     strength = cause.get("strength_over_noise")
     return (
         ", or ".join(names), Markup(", ").join(_sizes(cause["parameters"])), _bar(strength),
@@ -95,7 +96,7 @@ def _sizes(parameters: Record) -> Iterator[Text]:
         factor, unit = _scale(size["value"], str(size["unit"]))
         shown = with_interval(factor * size["value"], half_width(size["std"], factor))
         stem = name.rpartition("_")
-        words = _words(stem[0] if stem[2] == str(size["unit"]).lower() else name)
+        words = cause_name(stem[0] if stem[2] == str(size["unit"]).lower() else name)
         yield Markup('<span class="n">{}</span>').format(f"{words + ' ' if many else ''}{shown} {unit}")
 
 
@@ -215,14 +216,10 @@ def _limits(diagnosis: Record) -> Markup | None:
         size = next(iter(limit.values())) if limit and isinstance(next(iter(limit.values())), dict) else limit
         if {"value", "unit"} <= set(size):
             factor, unit = _scale(size["value"], str(size["unit"]))
-            shown = (marks.capitalised(_words(name)), digits(factor * size["value"], 2), unit)
+            shown = (marks.capitalised(cause_name(name)), digits(factor * size["value"], 2), unit)
             rows.append(Markup("<div><dt>{}</dt><dd>{} {}</dd></div>").format(*shown))
     if not rows:
         return None
     return Markup("<section><h3>Looked for and not found; this much would have been seen</h3>") + Markup(
         '<dl class="seen">{}</dl></section>'
     ).format(Markup("").join(rows))
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

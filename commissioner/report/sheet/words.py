@@ -19,6 +19,12 @@ _MOST_DIGITS = 9
 UNIT_ENDINGS = ("_a_per_min", "_rad_per_s", "_ppm", "_us", "_ms", "_wb", "_nf", "_hz_a", "_v", "_a", "_s")
 
 
+def cause_name(name: str) -> str:
+    """`dc_link_sag` as `DC link sag`."""
+    words = name.replace("_", " ")
+    return f"DC{words[2:]}" if words.startswith("dc ") else words
+
+
 def typeset(text: str) -> str:
     """Signs, and no break before a unit; an angle's sign stands at its number."""
     for plain, sign in _SIGNS:

@@ -21,12 +21,12 @@ from commissioner.report.diagnosis.names import (
     plain_of,
     sentence,
     size_words,
-    spoken,
     sure_words,
 )
 from commissioner.report.diagnosis.page import page_of
 from commissioner.report.diagnosis.words import actions, headline, meaning, remarks, tone
 from commissioner.report.page import Page, Table, render
+from commissioner.report.sheet.words import cause_name
 
 FACTS = Facts(2e-4, 5.0, 1500.0, 0.8, 5.0, 5000.0, 540.0, 3)
 LOST = {"voltage_v": (7.9, 0.07, "V"), "half_current_a": (0.1, 0.005, "A"), "time_us": (2.9, 0.03, "us")}
@@ -195,7 +195,7 @@ def test_every_cause_has_a_sentence_with_and_without_a_size_and_what_decides_it(
         words = sentence(one)
         assert "{" not in words and "_" not in words and "()" not in words and not words.endswith((" ", ":", ","))
     assert CATALOGUE[name].decides.endswith(".") and (CATALOGUE[name].words.motor or plain_of(bare).motor)
-    assert "_" not in spoken(name)
+    assert "_" not in cause_name(name)
 
 
 def test_a_delay_below_zero_is_a_current_that_is_read_late():

@@ -375,7 +375,7 @@ def test_a_diagnosis_is_told_with_its_sizes_and_one_that_was_stopped_is_not():
         }],
         "parameters_before": {"stator_resistance_ohm": {"value": 9.5, "std": 1e-4}},
         "parameters_after": {"stator_resistance_ohm": {"value": 3.737, "std": 0.019}},
-        "detection_limits": {"iron_loss": {"conductance_ms": {"value": 0.22, "unit": "mS"}}, "dead_time": {"v": {"value": 1.0, "unit": "V"}}},
+        "detection_limits": {"iron_loss": {"conductance_ms": {"value": 0.22, "unit": "mS"}}, "dc_link_ripple": {"fraction": {"value": 0.001, "unit": "1"}}, "dead_time": {"v": {"value": 1.0, "unit": "V"}}},
         "cannot_tell": ["a | b"],
         "next_experiment": {"steps": ["Halve it.", "Read both together:"], "command": "commissioner diagnose a b", "changes_values": "No."},
     }  # fmt: skip
@@ -386,6 +386,7 @@ def test_a_diagnosis_is_told_with_its_sizes_and_one_that_was_stopped_is_not():
         "99.9 %",
         "+156 %",
         "0.22 mS",
+        "DC link ripple",
         "commissioner diagnose a b",
         "285 mA",
     ):

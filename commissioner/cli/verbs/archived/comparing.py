@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli.screens import screen
+from commissioner.motor.quantities import field_name
 from commissioner.operations.history.compare import Compared, Held, compare_with_drive, compare_with_recordings
 from commissioner.operations.history.compare import compare_runs as carry_out
 
@@ -37,7 +38,9 @@ def compare_drive(folder: Path, run: str, drive: str | None, *, as_json: bool) -
 
 def _show(done: Compared) -> None:
     comparison = done.comparison
-    rows = [(c.parameter, f"{100 * c.relative_change:+.2f} %", f"{c.sigmas:.1f}") for c in comparison.changes]
+    rows = [
+        (field_name(c.parameter), f"{100 * c.relative_change:+.2f} %", f"{c.sigmas:.1f}") for c in comparison.changes
+    ]
     screen.out.print(f"[bold]{comparison.verdict.value}[/]\n  {screen.text(comparison.reason)}")
     screen.out.print(screen.table("", ("parameter", "change", "standard errors"), rows, right=(1, 2)))
     if done.explained_by:
@@ -45,14 +48,14 @@ def _show(done: Compared) -> None:
     for one in done.explained_by:
         screen.out.print(f"    {screen.text(one.sentence)}")
     for sentence in done.common.sentences:
-        screen.out.print(f"  [dim]•[/] {screen.text(sentence)}")
+        screen.out.print(f"  [dim]•[/] {screen.signs(screen.text(sentence))}")
 
 
 def _show_held(done: Held) -> None:
     screen.out.print(f"[bold]{screen.text(done.drive)} holds {done.holds}[/] ({screen.text(done.run)})")
     rows = [
         (
-            row.parameter,
+            field_name(row.parameter),
             f"{row.run:.5g}",
             f"{row.drive:.5g}",
             f"{100 * row.relative_change:+.2f} %",

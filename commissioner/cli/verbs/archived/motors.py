@@ -10,6 +10,7 @@ from typing_extensions import TypedDict
 from commissioner.cli.screens import screen
 from commissioner.errors import UsageError
 from commissioner.history.motor import in_percent
+from commissioner.motor.quantities import field_name
 from commissioner.operations.history.motors import Likeness, Motor, judge_motor, list_motors, name_motor
 from commissioner.operations.history.runs import Archive
 from commissioner.operations.history.trend import MotorTrend, trend, trend_of_indicators
@@ -101,7 +102,7 @@ def _name(archive: Archive, run: str, tag: str, serial: str, *, confirm: bool, a
 def _show(done: MotorTrend) -> None:
     screen.out.print(f"[bold]{screen.text(done.motor)}[/]")
     rows = [
-        (one.name, str(len(one.points)), screen.quantity(one.level, one.level_std, one.unit),
+        (field_name(one.name), str(len(one.points)), screen.signs(screen.quantity(one.level, one.level_std, one.unit)),
          "" if one.slope_per_year is None else in_percent(one.slope_per_year, one.slope_std or 0.0),
          str(len(one.steps)), "[red]alarm[/]" if one.is_alarm else "")
         for one in done.found.trends

@@ -16,7 +16,7 @@ from commissioner.text import counted
 WORKS = {
     "excite": "run: the whole procedure at standstill",
     "stream": "samples over the link",
-    "write_back": "run or identify with --write-back",
+    "write_back": "identify FILE --write-back, and run where it works",
     "restore": "restore",
 }
 """What a capability in a drive file means for a person at the command line."""
@@ -61,7 +61,7 @@ def list_drives(*, as_json: bool) -> None:
 
 def _can(profile: DriveProfile) -> str:
     tuning = [f"tune ({profile.tuning.form})"] if profile.tuning else []
-    return ", ".join([*sorted(profile.capabilities), *tuning]) or (
+    return ", ".join([*(name.replace("_", "-") for name in sorted(profile.capabilities)), *tuning]) or (
         "reading" if profile.items else "nothing: no register has a source"
     )
 
@@ -77,8 +77,9 @@ def show_drive(name: str, *, as_json: bool) -> None:
     )
     rows = [("[green]✓[/]" if works else "[dim]–[/]", verb, escape(why)) for verb, works, why in works_with(profile)]
     screen.out.print(screen.table("", ("", "with this drive", ""), rows))
-    for topic, sentence in sorted(profile.unknown.items()):
-        screen.out.print(f"[yellow]not known[/] {escape(topic)}: {escape(sentence)}")
+    if profile.unknown:
+        unknown = [(escape(topic.replace("_", " ")), escape(said)) for topic, said in sorted(profile.unknown.items())]
+        screen.out.print(screen.table("", ("not known", ""), unknown))
 
 
 def works_with(profile: DriveProfile) -> list[tuple[str, bool, str]]:
