@@ -50,6 +50,14 @@ def test_nothing_is_energised_unless_told(drive):
     assert answer.json["energised"] is False
 
 
+def test_what_waits_for_a_voltage_is_told_once_and_each_by_name():
+    """44 rules said the same sentence, and what was found lay above three screens of it."""
+    with SimProcess("--scenario", "default", "--tcp", "0") as sim:
+        told = call("drives", "conformance", sim.url).stdout
+    assert told.count("give --energise") == 1
+    assert {rule.name for rule in RULES} <= set(told.replace(",", " ").split())
+
+
 def test_every_rule_that_was_tried_shows_requests_replies_and_times():
     with SimProcess("--scenario", "default", "--tcp", "0") as sim:
         document = call("drives", "conformance", sim.url, "--json").json
