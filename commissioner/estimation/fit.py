@@ -145,19 +145,23 @@ MOST_BUSY = 160
 
 
 def knot_times(record: Record, also: Sequence[NDArray[np.bool_]] = ()) -> Array:
-    """(windows, knots), denser where the current changes after the start and at the samples `also` of each window; short rows are filled up
-    far beyond the end."""
-    busy = [w.state == BUSY for w in record.windows]
-    if also:
-        busy = [a | b for a, b in zip(busy, also, strict=True)]
-    spans = [_changes(w, mask, record.period_s) for w, mask in zip(record.windows, busy, strict=True)]
-    apart = max(BUSY_S, sum(high - low for own in spans for low, high in own) / MOST_BUSY)
+    """(windows, knots), denser where the current changes after the start, and as dense as if nothing else did at the samples `also` of each window;
+    short rows are filled up far beyond the end."""
+    also = also or [np.zeros(w.count, bool) for w in record.windows]
+    others = [(w.state == BUSY) & ~a for w, a in zip(record.windows, also, strict=True)]
     rows = []
-    for w, own in zip(record.windows, spans, strict=True):
+    for w, *parts in zip(record.windows, _among_changes(record, others), _among_changes(record, also), strict=True):
         calm = np.arange(0.0, float(w.time_s[-1]) + CALM_S, CALM_S)
-        rows.append(np.unique(np.concatenate([calm, *(np.arange(low, high, apart) for low, high in own)])))
+        rows.append(np.unique(np.concatenate([calm, *parts])))
     widest = max(r.size for r in rows)
     return np.array([np.concatenate([r, r[-1] + 1e3 * (1.0 + np.arange(widest - r.size))]) for r in rows])
+
+
+def _among_changes(record: Record, is_busy: Sequence[NDArray[np.bool_]]) -> list[Array]:
+    """Times of each window near what changes in it, as near each other as `MOST_BUSY` of all windows together allow."""
+    spans = [_changes(w, mask, record.period_s) for w, mask in zip(record.windows, is_busy, strict=True)]
+    apart = max(BUSY_S, sum(high - low for own in spans for low, high in own) / MOST_BUSY)
+    return [np.concatenate([np.empty(0), *(np.arange(low, high, apart) for low, high in own)]) for own in spans]
 
 
 def _changes(w: Window, is_busy: NDArray[np.bool_], period_s: float) -> list[tuple[float, float]]:
