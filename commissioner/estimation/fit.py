@@ -81,7 +81,7 @@ class Machine:
         p = self.theta + self.beside[window]
         for k in LOGARITHMIC:
             p[k] = np.exp(p[k])
-        return p
+        return np.asarray(p)
 
     def values(self) -> dict[str, float]:
         """All numbers by name, as the first window has them."""
