@@ -12,7 +12,7 @@ from scipy.ndimage import maximum_filter1d
 from commissioner.estimation.cancelling import ask_for_time
 from commissioner.estimation.kernels.march import STATES, UNSET, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise
-from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
 from commissioner.estimation.record import Record, Window, first_part
 from commissioner.estimation.told import Told, inverse, told
@@ -46,7 +46,8 @@ EDGE = 2
 
 @dataclass(frozen=True)
 class Column:
-    """One free number: `kind` p (a number of the machine), x (first state of a window), k (knot of the load torque)."""
+    """One free number: `kind` p (a number of the machine), w (what a window has beside it), x (first state of a window), k (knot of the
+    load torque)."""
 
     kind: str
     index: int
@@ -59,12 +60,13 @@ INERTIA = Column("p", AT["inertia"])
 @dataclass(frozen=True)
 class Machine:
     """Numbers in fit coordinates (logarithms of the positive ones), first states (windows, states), knots of the load and their
-    times (windows, knots)."""
+    times (windows, knots); `beside` (windows, numbers): what each window has beside the numbers."""
 
     theta: Array
     first: Array
     knots: Array
     knot_times_s: Array
+    beside: Array
     has_shaft: bool = False
 
     def places(self, window: int, count: int, period_s: float) -> Array:
@@ -74,15 +76,15 @@ class Machine:
         times = self.knot_times_s[window]
         return np.asarray(np.interp(0.5 * period_s * np.arange(2 * count - 1), times, np.arange(times.size)))
 
-    def physical(self) -> Array:
-        """As the kernel takes them."""
-        p = self.theta.copy()
+    def physical(self, window: int = 0) -> Array:
+        """As the kernel takes them for a window."""
+        p = self.theta + self.beside[window]
         for k in LOGARITHMIC:
             p[k] = np.exp(p[k])
-        return p
+        return np.asarray(p)
 
     def values(self) -> dict[str, float]:
-        """All numbers by name."""
+        """All numbers by name, as the first window has them."""
         return dict(zip(NAMES, self.physical().tolist(), strict=True))
 
     def slope(self) -> Array:
@@ -98,23 +100,26 @@ class Machine:
 
     def moved(self, columns: Sequence[Column], step: Array) -> Machine:
         """With the columns' numbers changed by `step`."""
-        theta, first, knots = self.theta.copy(), self.first.copy(), self.knots.copy()
+        theta, beside, first, knots = self.theta.copy(), self.beside.copy(), self.first.copy(), self.knots.copy()
         for column, s in zip(columns, step, strict=True):
             if column.kind == "p":
                 theta[column.index] += s
+            elif column.kind == "w":
+                beside[column.window, column.index] += s
             elif column.kind == "x":
                 first[column.window, column.index] += s
             else:
                 knots[column.window, column.index] += s
-        return replace(self, theta=theta, first=first, knots=knots)
+        return replace(self, theta=theta, beside=beside, first=first, knots=knots)
 
     def with_values(self, values: dict[str, float]) -> Machine:
-        """With numbers set, in physical units."""
-        theta = self.theta.copy()
+        """With numbers set, in physical units, alike in every window."""
+        theta, beside = self.theta.copy(), self.beside.copy()
         for name, value in values.items():
             k = AT[name]
             theta[k] = np.log(value) if k in LOGARITHMIC else value
-        return replace(self, theta=theta)
+            beside[:, k] = 0.0
+        return replace(self, theta=theta, beside=beside)
 
 
 def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0, has_shaft: bool = False) -> Machine:
@@ -129,7 +134,8 @@ def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0
             first[k, 0:4] = [w.voltage[0, 1], -w.voltage[0, 0]] * 2 / np.array(record.scales.frequency_rad_per_s)
             before = record.windows[max(k - 1, 0)]  # the shaft still turns with its field
             first[k, 8] = before.direction * (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
-    return Machine(theta, first, np.zeros(times.shape), times, has_shaft).with_values(values)
+    beside = np.zeros((len(record.windows), COUNT))
+    return Machine(theta, first, np.zeros(times.shape), times, beside, has_shaft).with_values(values)
 
 
 CALM_S, BUSY_S, AROUND_S = 0.15, 5e-3, 0.03
@@ -139,19 +145,23 @@ MOST_BUSY = 160
 
 
 def knot_times(record: Record, also: Sequence[NDArray[np.bool_]] = ()) -> Array:
-    """(windows, knots), denser where the current changes after the start and at the samples `also` of each window; short rows are filled up
-    far beyond the end."""
-    busy = [w.state == BUSY for w in record.windows]
-    if also:
-        busy = [a | b for a, b in zip(busy, also, strict=True)]
-    spans = [_changes(w, mask, record.period_s) for w, mask in zip(record.windows, busy, strict=True)]
-    apart = max(BUSY_S, sum(high - low for own in spans for low, high in own) / MOST_BUSY)
+    """(windows, knots), denser where the current changes after the start, and as dense as if nothing else did at the samples `also` of each window;
+    short rows are filled up far beyond the end."""
+    also = also or [np.zeros(w.count, bool) for w in record.windows]
+    others = [(w.state == BUSY) & ~a for w, a in zip(record.windows, also, strict=True)]
     rows = []
-    for w, own in zip(record.windows, spans, strict=True):
+    for w, *parts in zip(record.windows, _among_changes(record, others), _among_changes(record, also), strict=True):
         calm = np.arange(0.0, float(w.time_s[-1]) + CALM_S, CALM_S)
-        rows.append(np.unique(np.concatenate([calm, *(np.arange(low, high, apart) for low, high in own)])))
+        rows.append(np.unique(np.concatenate([calm, *parts])))
     widest = max(r.size for r in rows)
     return np.array([np.concatenate([r, r[-1] + 1e3 * (1.0 + np.arange(widest - r.size))]) for r in rows])
+
+
+def _among_changes(record: Record, is_busy: Sequence[NDArray[np.bool_]]) -> list[Array]:
+    """Times of each window near what changes in it, as near each other as `MOST_BUSY` of all windows together allow."""
+    spans = [_changes(w, mask, record.period_s) for w, mask in zip(record.windows, is_busy, strict=True)]
+    apart = max(BUSY_S, sum(high - low for own in spans for low, high in own) / MOST_BUSY)
+    return [np.concatenate([np.empty(0), *(np.arange(low, high, apart) for low, high in own)]) for own in spans]
 
 
 def _changes(w: Window, is_busy: NDArray[np.bool_], period_s: float) -> list[tuple[float, float]]:
@@ -199,13 +209,13 @@ def problem_of(record: Record, held_out: float = 0.3) -> Problem:
 def simulate(problem: Problem, machine: Machine) -> list[tuple[Array, Array]]:
     """Current (n, 3) and shaft (n, 2: electrical speed, torque) of each window. TimeOver: given up."""
     out = []
-    p, scales = machine.physical(), problem.record.scales.as_tuple()
+    scales = problem.record.scales.as_tuple()
     for k, w in enumerate(problem.record.windows):
         ask_for_time()
         run, shaft = np.empty((w.count, 3)), np.empty((w.count, 2))
         x = machine.first[k].copy()
         march(
-            p,
+            machine.physical(k),
             scales,
             x,
             w.voltage,
@@ -251,7 +261,7 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
         ask_for_time()
         run = np.zeros((len(columns), u, 3))
-        own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind == "x" and c.window == k)]
+        own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind in "wx" and c.window == k)]
         by_load = [j for j, c in enumerate(columns) if c.kind == "k" and c.window == k]
         run[own] = _along_numbers(problem, machine, k, [columns[j] for j in own])
         if by_load:
@@ -272,13 +282,13 @@ def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence
     slope, w, u = machine.slope(), problem.record.windows[k], problem.until[k]
     dp, dx = np.zeros((len(columns), COUNT)), np.zeros((len(columns), STATES))
     for row, column in enumerate(columns):
-        if column.kind == "p":
+        if column.kind in "pw":
             dp[row, column.index] = slope[column.index]
         else:
             dx[row, column.index] = 1.0
     run = np.empty((len(columns), u, 3))
     tangents(
-        machine.physical(), problem.record.scales.as_tuple(), machine.first[k], dp, dx, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
+        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], dp, dx, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
         machine.knots[k], machine.places(k, u, problem.period), problem.period, machine.has_shaft, run,
     )  # fmt: skip
     return run
@@ -289,7 +299,7 @@ def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Arra
     w, u = problem.record.windows[k], problem.until[k]
     run = np.empty((count, u, 3))
     load_tangents(
-        machine.physical(), problem.record.scales.as_tuple(), machine.first[k], w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
+        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
         machine.knots[k], machine.places(k, u, problem.period), problem.period, run,
     )  # fmt: skip
     return run
@@ -363,9 +373,16 @@ class Fit:
         return float(np.sqrt(self.covariance()[place, place]) * self.machine.slope()[AT[name]])
 
 
+def numbers_of(names: Sequence[str], record: Record) -> tuple[Column, ...]:
+    """The named numbers; of those that go with the shaft's angle also what each further window has beside the first, behind all."""
+    places = [AT[name] for name in names]
+    later = range(1, len(record.windows))
+    return (*(Column("p", j) for j in places), *(Column("w", j, k) for k in later for j in places if j in OF_ANGLE))
+
+
 def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots: bool = False) -> tuple[Column, ...]:
     """The named numbers, both fluxes of every window, the speed of one that turns already, knots of the load."""
-    out = [Column("p", AT[name]) for name in names]
+    out = [*numbers_of(names, record)]
     for k, w in enumerate(record.windows):
         out += [Column("x", j, k) for j in FIRST]
         if machine.has_shaft and not w.is_from_rest:

@@ -32,6 +32,8 @@ LOGARITHMIC = frozenset(
         "dead_knee", "inertia", "leakage_split",
     )
 )  # fmt: skip
+OF_ANGLE = frozenset(AT[n] for n in NAMES if n.startswith(("speed_ripple", "load_ripple", "cage_asymmetry")))
+"""Numbers that are told from the shaft's angle, which is any at a window's first sample: each further window has its own."""
 SHAPES = frozenset(AT[n] for n in ("leakage_bend", "leakage_knee", "leakage_split", "bar_corner", "dead_knee"))
 """Numbers that shape the law of another one, weakly determined beside it."""
 DEFAULTS = {"leakage_split": 1.0, "leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}

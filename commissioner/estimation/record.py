@@ -500,6 +500,12 @@ def _means(window: Window, period: float) -> tuple[list[float], list[float]]:
     return [float(size[k : k + block].mean()) for k in starts], [float(volts[k : k + block].mean()) for k in starts]
 
 
+def _stays(means: Sequence[float], j: int) -> float:
+    """By how much the two blocks after this one differ from the two before: a step stays, what swings with the shaft comes back."""
+    before, after = means[max(j - 2, 0) : j] or means[j : j + 1], means[j + 1 : j + 3] or means[j : j + 1]
+    return abs(float(np.mean(after)) - float(np.mean(before)))
+
+
 def _states(window: Window, scales: Scales, period: float) -> NDArray[np.int64]:
     """One of `STATES` for every sample, decided over blocks of a period of the supply."""
     block = max(round(BLOCK_S / period), 1)
@@ -519,5 +525,7 @@ def _states(window: Window, scales: Scales, period: float) -> NDArray[np.int64]:
             out[part] = STATES.index("start")
         else:
             started = True
-            out[part] = STATES.index("transient" if moves else "steady")
+            out[part] = STATES.index(
+                "transient" if moves and _stays(means, j) > MOVES * max(mean, 0.2 * scales.current_a) else "steady"
+            )
     return out

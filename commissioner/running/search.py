@@ -15,6 +15,7 @@ from commissioner.estimation.fit import (
     Machine,
     Problem,
     jacobian,
+    numbers_of,
     refine,
     refreshed,
 )
@@ -70,8 +71,8 @@ class Tried:
 
     @property
     def worth(self) -> float:
-        """Gain less what its further numbers would gain by chance."""
-        return self.gain - RULES.each_further_number * self.fit.scale * len(self.cause.numbers)
+        """Gain less what its numbers, among all that are free, would gain by chance: of those beside the same causes it tells the order."""
+        return self.gain - RULES.each_further_number * self.fit.scale * len(self.fit.columns)
 
     @property
     def explains_all(self) -> bool:
@@ -140,14 +141,17 @@ class Search:
 
     def columns(self, causes: Sequence[Named]) -> tuple[Column, ...]:
         """All that is free with these causes."""
-        own = [Column("p", AT[n]) for c in causes for n in c.numbers]
-        return (*self.base.columns, *own)
+        return (*self.base.columns, *(column for c in causes for column in self.own(c.numbers)))
+
+    def own(self, numbers: Sequence[str]) -> tuple[Column, ...]:
+        """The columns of a cause's numbers in this recording."""
+        return numbers_of(numbers, self.problem.record)
 
     def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
         """With these causes free; `near` is a fit near by, whose sensitivities serve as long as they do. `first`: Jacobian for the first
         step, without spare numbers then."""
         if first is not None:
-            own = [Column("p", AT[n]) for c in causes[-1:] for n in c.form.numbers]
+            own = [column for c in causes[-1:] for column in self.own(c.form.numbers)]
             before = self.columns(causes[:-1])
             start = refine(self.problem, start, (*before, *own), most=1, first_jacobian=first, is_final=False).machine
         start, columns = self._inside(start, causes), self.columns(causes)
@@ -280,7 +284,7 @@ def _is_lost(shown: Fit, one: Named) -> bool:
 
 def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[float, Named, Array]]:
     """Linear gain of each form beside all that is free, best first, with its own sensitivities."""
-    columns = [Column("p", AT[n]) for c in causes for n in c.form.numbers]
+    columns = [column for c in causes for column in seeking.own(c.form.numbers)]
     if not columns:
         return []
     all_own = jacobian(seeking.problem, fit.machine, columns)
@@ -288,13 +292,13 @@ def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[fl
     rest = fit.rest - basis @ (basis.T @ fit.rest)
     out, at = [], 0
     for one in causes:
-        size = len(one.form.numbers)
+        size = len(seeking.own(one.form.numbers))
         own = all_own[at : at + size]
         at += size
         apart = own - (own @ basis) @ basis.T
         gram = apart @ apart.T + np.diag(1e-9 * np.maximum(np.sum(own * own, axis=1), 1e-30))
         best = np.linalg.solve(gram, apart @ rest)
-        values = dict(zip(NAMES, fit.machine.physical(), strict=True)) | dict(zip(one.form.numbers, best, strict=True))
+        values = dict(zip(NAMES, fit.machine.physical(), strict=True)) | dict(zip(one.form.numbers, best, strict=False))
         gain = float(best @ (apart @ rest))
         if size == 1 and not CATALOGUE[one.cause].is_plausible(values, seeking.problem.record.scales):
             lowest = CATALOGUE[one.cause].range[0]
@@ -304,7 +308,7 @@ def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[fl
 
 
 def _needed(seeking: Search, one: Named) -> float:
-    return RULES.least_gain + RULES.each_further_number * (len(one.numbers) - 1)
+    return RULES.least_gain + RULES.each_further_number * (len(seeking.own(one.numbers)) - 1)
 
 
 def _forward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]] | None:
@@ -441,20 +445,20 @@ def _rivals(
 ) -> list[tuple[float, Named, Fit]]:
     """Fits with cause k replaced by those that look alike: (chi-square lost, rival, fit); `less` is the one without either."""
     one, names = accepted[k], {c.cause for c in accepted}
-    own_names = set(one.numbers)
-    own = np.array([j for j, c in enumerate(fit.columns) if c.kind == "p" and NAMES[c.index] in own_names])
+    own_columns = set(seeking.own(one.numbers))
+    own = np.array([j for j, c in enumerate(fit.columns) if c in own_columns])
     kept = np.array([j for j in range(len(fit.columns)) if j not in set(own.tolist())])
     basis, _ = np.linalg.qr(fit.jacobian[kept].T)
     mine = fit.jacobian[own] - (fit.jacobian[own] @ basis) @ basis.T
     candidates = [c for c in seeking.candidates(names) if c.cause not in always_tied(one.cause)]
     forms = (f for f in CATALOGUE[one.cause].forms if f.needs(seeking.problem.record))
     candidates += [Named(one.cause, f) for f in forms if f != one.form]
-    columns = [Column("p", AT[n]) for c in candidates for n in c.form.numbers]
+    columns = [column for c in candidates for column in seeking.own(c.form.numbers)]
     theirs = jacobian(seeking.problem, fit.machine, columns)
     theirs = theirs - (theirs @ basis) @ basis.T
     alike, at = [], 0
     for c in candidates:
-        size = len(c.form.numbers)
+        size = len(seeking.own(c.form.numbers))
         alike.append((_canonical(mine, theirs[at : at + size]), c))
         at += size
     alike.sort(key=lambda item: -item[0])

@@ -25,6 +25,17 @@ def test_an_iron_loss_is_in_the_errors_of_the_four(course: str, seed: int) -> No
         assert abs(own.value - value) < 3.0 * own.std, (name, own, value)
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_an_iron_loss_that_a_start_tells_is_taken_out_of_the_four(seed: int) -> None:
+    """Its size was told to some per cent, and R_R stayed as far off as the loss had drawn it, by 2 %."""
+    recording, plate, truth = taken(Case(seed, "one", "start", only="iron_loss").scenario(), seed)
+    found = identify([recording], plate)
+    r_r = found.parameters["rotor_resistance_ohm"]
+    assert r_r.value == pytest.approx(truth["inverse_gamma"]["rotor_resistance_ohm"], rel=2e-3)
+    assert r_r.std < 0.015 * r_r.value
+    assert any("an iron loss" in r for r in found.remarks)
+
+
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only `diagnose` asked whether the plate's motor may be so."""
     recording, plate, _ = taken(Case(4, "null", "steady").scenario(), 4)

@@ -40,6 +40,27 @@ def test_a_run_up_under_a_pulsating_load_ends() -> None:
     assert np.flatnonzero(window.state == STATES.index("start")).max() * PERIOD < 0.25
 
 
+def test_a_step_is_told_from_a_load_that_swings() -> None:
+    """Each 20 ms differed from the next under a swing of 2 %: half of a recording was load steps, with knots 24 ms apart at the true ones, and a
+    healthy motor was called unexplained, 7 times the noise, after two minutes."""
+    swinging = _running(0, inertia=0.03, load_constant=0.4, later=0.3, load_ripple_cos=0.1)
+    record = prepare([swinging], PLATE)
+    (window,) = record.windows
+    steps = window.time_s[window.state == STATES.index("transient")]
+    assert steps.size
+    assert np.all((steps > 1.1) & (steps < 1.35))
+
+
+def test_knots_are_dense_where_something_is_left_however_much_else_changes() -> None:
+    record = prepare([_running(0, inertia=0.03, load_constant=0.4)], PLATE)
+    (window,) = record.windows
+    all_changes = replace(window, state=np.full_like(window.state, STATES.index("transient")))
+    left = (window.time_s > 1.0) & (window.time_s < 1.1)
+    (times,) = fit.knot_times(replace(record, windows=(all_changes,)), [left])
+    assert np.max(np.diff(times[(times > 1.0) & (times < 1.1)])) < 1.01 * fit.BUSY_S
+    assert np.median(np.diff(times[times < 0.9])) > 2.0 * fit.BUSY_S
+
+
 @pytest.fixture(scope="module")
 def steady() -> tuple[Problem, Fit]:
     """One steady load without any swing: the plain motor's fit."""
