@@ -9,6 +9,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from commissioner.estimation.fit import Machine
+from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, Scales
 from commissioner.estimation.record import Record
 from commissioner.motor.circuit import Gamma, InverseGamma
@@ -107,7 +108,7 @@ def machine_of(document: Mapping[str, Any], *, is_plain: bool) -> tuple[Machine,
     left_out = {n for names in document["effect_numbers"].values() for n in names} if is_plain else set()
     theta = np.zeros(COUNT)
     machine = Machine(
-        theta, np.zeros((1, 10)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, COUNT)), bool(document["has_shaft"])
+        theta, np.zeros((1, STATES)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, COUNT)), bool(document["has_shaft"])
     )
     values = {**DEFAULTS, **{str(n): float(v) for n, v in document["numbers"].items() if n not in left_out}}
     unknown = [n for n in values if n not in AT]

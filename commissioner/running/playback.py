@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.estimation.fit import Machine, Problem, columns_of, plain_machine, problem_of, refine, simulate
+from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import Scales
 from commissioner.estimation.record import Record, Window, between, prepare
 from commissioner.motor.nameplate import Nameplate
@@ -72,7 +73,5 @@ def _on_mains(
     )
     times = np.array([[0.0, 0.3, 0.4, 1.0, 1.01, 2.0, 2.01, SECONDS]])
     knots = np.array([[0.0, 0.0, 0.1, 0.1, 0.5, 0.5, 0.9, 0.9]])
-    moved = replace(
-        machine, has_shaft=True, knots=knots, knot_times_s=times, first=np.zeros((1, machine.first.shape[1]))
-    )
+    moved = replace(machine, has_shaft=True, knots=knots, knot_times_s=times, first=np.zeros((1, STATES)))
     return moved.with_values({"inertia": inertia}), problem_of(record, 0.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from commissioner.estimation.fit import Column, Fit, Machine
+from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import AT
 from commissioner.estimation.numbers import COUNT as NUMBERS
 from commissioner.estimation.told import inverse, told
@@ -60,6 +61,8 @@ def test_a_long_recording_does_not_tell_what_only_its_noise_does(along: tuple[fl
     turned, _ = np.linalg.qr(np.column_stack([along, np.eye(3)[:, :2]]))
     jacobian = turned @ np.diag([200.0, 1e3, 1e3])
     by_noise = 0.6 * np.outer(turned[:, 0], turned[:, 0]) * 200.0**2
-    machine = Machine(np.zeros(NUMBERS), np.zeros((1, 10)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, NUMBERS)))
+    machine = Machine(
+        np.zeros(NUMBERS), np.zeros((1, STATES)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, NUMBERS))
+    )
     fit = Fit(machine, columns, 3.0, np.ones(3), jacobian, 0.0, 0, by_noise)
     assert set(fit.not_told()) == opened
