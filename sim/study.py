@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from sim.physics.effects import CATALOGUE
 from sim.physics.inductance import inverse_gamma
 from sim.scenario import Scenario, ScenarioError, build, motor_of, read_document, table_machine, table_rows
 from sim.truth import apparent_resistance_ohm, link_gain, sensor_gain
-from sim.wire.faults import FaultError
+from sim.wire.faults import FaultError, parse
 from sim.wire.in_process import Station
 
 LARGEST_KW, VOLTAGES = 75.0, (200.0, 500.0)
@@ -28,7 +29,9 @@ class Drawn:
 
     def __init__(self, motor: str, scenario: Scenario, seed: int, faults: Sequence[str]) -> None:
         self.motor, self.scenario, self.document = motor, scenario, scenario.document
-        self.station = Station(scenario, seed, tuple(faults))
+        self._seed, self._faults = seed, tuple(faults)
+        for text in faults:
+            parse(text)
         self.effects = [effect.name for effect in scenario.plant.effects]
         plate = scenario.plant.nameplate
         self.plate: Mapping[str, Any] = {
@@ -38,6 +41,14 @@ class Drawn:
             "connection": "star",
         }  # fmt: skip
 
+    @cached_property
+    def station(self) -> Station:
+        """The drive in this process. ValueError: a fault that only a line can have."""
+        try:
+            return Station(self.scenario, self._seed, self._faults)
+        except FaultError as error:
+            raise ValueError(str(error)) from error
+
     @property
     def highest_flux_wb(self) -> float:
         return self.station.highest_flux_wb
@@ -46,7 +57,7 @@ class Drawn:
         """Secant inverse-Gamma values at a peak stator flux, as they are at the drive's terminals and through its sensors along
         these axes: the stator's resistance with that of the devices, and every impedance over the gain of the sensors and of the
         link, for nothing that the drive measures tells any of them apart."""
-        plant = self.station.scenario.plant
+        plant = self.scenario.plant
         secant = inverse_gamma(plant, stator_flux_wb)
         truth = {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
         gain = sensor_gain(plant, axes_deg) * link_gain(plant)

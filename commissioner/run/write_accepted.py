@@ -153,8 +153,8 @@ def check_token(plan: Plan, token: str) -> None:
         raise Aborted(
             "the table has changed since it was shown; nothing was written",
             step="compare with the table",
-            value=plan.token,
-            limit=token,
+            value="the token of another table",
+            limit="the token of the table as it is now",
             remedy="look at the new table, then decide again",
         )
 

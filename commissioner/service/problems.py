@@ -12,6 +12,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
+from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
 from commissioner.errors import NOTHING, OF_DISK, Aborted, CommissionerError, DataRefused, DriveError, UsageError
@@ -157,6 +158,8 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
 
     @app.exception_handler(HTTPException)
     async def plain(request: Request, error: HTTPException) -> Response:
+        if error.status_code == 400:  # a form that its reader gave up
+            return answer(request, _unreadable_form(str(error.detail)))
         title = {404: "there is no such page or route", 405: "this method is not offered here"}.get(
             error.status_code, str(error.detail)
         )
@@ -175,10 +178,22 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
         )
 
 
+def _unreadable_form(said: str) -> Refusal:
+    return Refusal(
+        400, "the form cannot be read", detail=said, step="read the request", value=said,
+        limit="a whole form of at most 1000 files and 1000 fields, a field of at most 1 MB",
+        remedy="send it as a browser does: multipart/form-data with its boundary",
+    )  # fmt: skip
+
+
 def _shown(value: Any) -> Any:
-    """A value that fits into JSON and onto a screen."""
+    """A value that fits into JSON and onto a screen; a file is shown by its name."""
     if value is None:
         return NOTHING
+    if isinstance(value, list):
+        return ", ".join(str(_shown(each)) for each in value[:20])[:200]
+    if isinstance(value, UploadFile):
+        return str(value.filename)[:200]
     if isinstance(value, bool | int) or (isinstance(value, float) and math.isfinite(value)):
         return value
     return str(value)[:200]

@@ -12,6 +12,7 @@ from sim.drive.states import Answer
 from sim.physics import layout as at
 from sim.scenario import Scenario
 from sim.truth import answer_key
+from sim.wire.faults import DRIVE, FaultError
 from sim.wire.pace import Pace
 from sim.wire.station import Drive, Options
 
@@ -22,13 +23,18 @@ class Station:
     """One drive and its motor. Time is motor time: requests and `pass_time` move it, nothing else does.
 
     With a `pace` a request takes what its bytes, the slave's turn-around and the answer's bytes take, and a window holds
-    the samples that there are by then; without one a window waits until it is full."""
+    the samples that there are by then; without one a window waits until it is full. FaultError: one that only a line can have."""
 
     def __init__(self, scenario: Scenario, seed: int, faults: tuple[str, ...] = (), pace: Pace = Pace()) -> None:  # noqa: B008
         self.scenario, self.seed, self.pace = scenario, seed, pace
         self.drive = Drive(
             scenario, Options(seed=seed, faults=faults), keeps_motor_time=True, is_paced=not pace.is_free
         )
+        for fault in self.drive.plan.faults:
+            if fault.name not in DRIVE:
+                raise FaultError(
+                    f"fault {fault.name!r} is one of a line, and a drive in memory has none: give it over TCP"
+                )
         self.highest_flux_wb = 0.0
         """Peak stator flux that really was, so far."""
 
@@ -48,6 +54,7 @@ class Station:
     def answer(self, request: bytes) -> bytes:
         """A response PDU, or an exception's."""
         pace = self.pace
+        self.drive.plan.next_request(self.drive.firmware, request[0])
         if not pace.is_free:
             self.pass_time(pace.silence_s + pace.frame_s(len(request)) + max(pace.silence_s, pace.turnaround_s))
         response = self._answer(request)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, File, Form, Request, UploadFile
+from fastapi import APIRouter, File, Form, Request
 from fastapi.responses import Response
 from pydantic import ValidationError
 
@@ -16,7 +16,7 @@ from commissioner.service.page.frame import View, enter, enter_form, go, local, 
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.access import Credentials, log_in, log_out, set_cookie
 from commissioner.service.routes.history import compared, trend_of
-from commissioner.service.routes.recordings import take
+from commissioner.service.routes.recordings import MOST, Files, take
 
 router = APIRouter()
 ARCHIVE = View("shelves/archive.html", "Archive", nav="archive")
@@ -83,7 +83,7 @@ async def report(request: Request, run: str) -> Response:
 @router.post("/recordings")
 async def recordings(
     request: Request,
-    files: Annotated[list[UploadFile], File()],
+    files: Annotated[Files, File(max_length=MOST)],
     verb: Annotated[str, Form()] = "identify",
     motor: Annotated[str, Form()] = "",
     csrf: Annotated[str, Form()] = "",

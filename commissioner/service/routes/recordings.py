@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, File, Form, Request, UploadFile
 from fastapi.responses import FileResponse, Response
+from pydantic import BeforeValidator
 
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Operator, Viewer, parts_of
@@ -17,14 +18,25 @@ from commissioner.service.problems import Refusal
 from commissioner.service.recordings import Job
 
 router = APIRouter(route_class=Typed)
-PIECE = 1 << 20
+PIECE, MOST = 1 << 20, 12
+
+
+def _with_a_name(files: object) -> object:
+    """A part of a form that has no `filename` comes as text, not as a file."""
+    if isinstance(files, list) and any(isinstance(file, str) for file in files):
+        raise ValueError("each with its name (`filename`)")
+    return files
+
+
+Files = Annotated[list[UploadFile], BeforeValidator(_with_a_name)]
+"""What is uploaded: some of a form's parts, as files."""
 
 
 @router.post("/api/recordings", status_code=201)
 async def upload(
     request: Request,
     _who: Operator,
-    files: Annotated[list[UploadFile], File(max_length=12)],
+    files: Annotated[Files, File(max_length=MOST)],
     verb: Annotated[Literal["identify", "diagnose", "monitor"], Form()] = "identify",
     motor: Annotated[str, Form(max_length=60)] = "",
 ) -> RecordingDocument:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from commissioner.run.archive.verify import refuse_changed
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
 from commissioner.service.archive import Entry
@@ -24,6 +25,8 @@ from commissioner.settings import TestAngle
 
 router = APIRouter(route_class=Typed)
 USUAL = 100
+RECORD = ("request.json", "journal.jsonl")
+"""What a run is known by: nothing of it is exported where these are not as it left them."""
 Given = BeforeValidator(lambda value: value or USUAL)
 """A filter that a form left empty is none."""
 
@@ -114,19 +117,23 @@ async def report(request: Request, run: str, _who: Viewer) -> Response:
 async def export(
     request: Request, run: str, format: Literal["csv", "json", "mat", "parquet"], _who: Viewer
 ) -> Response:
-    """The samples as CSV, MATLAB 5 or Parquet, or the result as JSON."""
+    """The samples as CSV, MATLAB 5 or Parquet, or the result as JSON; nothing past a damaged journal, as on the command line."""
     parts = parts_of(request)
     entry = parts.archive.find(run)
     if format == "json":
-        return FileResponse(parts.archive.file(run, "result.json"), filename=f"{run}.json")
+        result = parts.archive.file(run, "result.json")
+        await asyncio.to_thread(refuse_changed, entry.folder, "export", "result.json", *RECORD)
+        return FileResponse(result, filename=f"{run}.json")
     target = await _exported(parts, entry, format)
     return FileResponse(target, filename=f"{run}.{format}")
 
 
 async def _exported(parts: Parts, entry: Entry, ending: str) -> Path:
-    """The file, made by the command line's own export; kept beside the service's logs for the next time."""
+    """The file, made by the command line's own export; kept beside the service's logs while the samples stay what they were."""
     target = parts.settings.data / "exports" / f"{entry.run}.{ending}"
-    if target.is_file():
+    await asyncio.to_thread(refuse_changed, entry.folder, "export", *RECORD)
+    samples = parts.archive.file(entry.run, "blocks.bin")
+    if target.is_file() and target.stat().st_mtime_ns > samples.stat().st_mtime_ns:
         return target
     target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     arguments = ["runs", "export", entry.run, str(target), "--runs", str(parts.archive.root), "--json"]

@@ -66,9 +66,12 @@ async def plan(parts: Parts, run: str, what: Act) -> WritePlan:
 
 
 async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> WrittenDocument | RestoredDocument:
-    """Write what the table of `token` showed; the audit has it before and after."""
+    """Write what the table of `token` showed; the audit has it before and after. Refusal 409: another operates the drive."""
     entry = parts.archive.find(run)
     drive = drive_of(parts, run)
+    if drive is not None:
+        _must_be_free(parts, drive, what)
+        parts.desk.control(drive.id).take(who.party)
     await parts.note(who, f"asked to {what}", run=run, table=token)
     arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
     done = await _with_drive(parts, drive, arguments, ACT_S)
@@ -78,15 +81,8 @@ async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> Wr
 
 
 async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], within_s: float) -> JsonObject:
-    if drive is not None and (parts.desk.live_on(drive.id) or parts.desk.is_starting(drive.id)):
-        raise Refusal(
-            409,
-            f"{drive.name} is in use by a run",
-            step=arguments[0],
-            value="a run goes on",
-            limit="no run on this drive",
-            remedy="wait for its end, or stop it",
-        )
+    if drive is not None:
+        _must_be_free(parts, drive, arguments[0])
     watch = parts.desk.watch(drive) if drive is not None else None
     if watch is not None:
         await asyncio.to_thread(watch.pause)
@@ -95,6 +91,19 @@ async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], w
     finally:
         if watch is not None:
             watch.resume()
+
+
+def _must_be_free(parts: Parts, drive: Drive, step: str) -> None:
+    """Refusal 409 where a run has the drive."""
+    if parts.desk.live_on(drive.id) or parts.desk.is_starting(drive.id):
+        raise Refusal(
+            409,
+            f"{drive.name} is in use by a run",
+            step=step,
+            value="a run goes on",
+            limit="no run on this drive",
+            remedy="wait for its end, or stop it",
+        )
 
 
 def drive_of(parts: Parts, run: str) -> Drive | None:

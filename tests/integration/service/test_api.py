@@ -133,7 +133,8 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
     assert nothing_yet.headers["location"] == f"/runs/{finished}"
     table = service.client.get(f"/api/runs/{finished}/write-back").json()
     assert {"register", "now", "will_be", "unit", "convention"} <= set(table["rows"][0])
-    is_problem(service.client.post(f"/api/runs/{finished}/write-back", json={"token": "another"}), 409)
+    forged = is_problem(service.client.post(f"/api/runs/{finished}/write-back", json={"token": "another"}), 409)
+    assert table["token"] not in str(forged) and forged["limit"] == "the token of the table as it is now"
     done = service.client.post(f"/api/runs/{finished}/write-back", json={"token": table["token"]}).json()
     assert done["outcome"] == "written"
     assert [w["read_back"] for w in done["report"]["written"]] == pytest.approx(

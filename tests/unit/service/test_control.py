@@ -2,14 +2,17 @@
 somebody who is there."""
 
 import asyncio
+from types import SimpleNamespace
 
 import pytest
 
-from commissioner.service.configuration import Settings
+from commissioner.service.configuration import DriveTable, ServiceFile, Settings
 from commissioner.service.parts import make_parts
 from commissioner.service.problems import Refusal
+from commissioner.service.routes.write import act
 from commissioner.service.runs import child, desk
 from commissioner.service.runs.control import Control, Pages, Party
+from tests.support.archive.synthetic import make_run
 
 
 class SlowChild:
@@ -62,6 +65,19 @@ def test_of_two_who_start_at_once_one_is_told_who_was_first(parts):
     _first, second = begin(parts, ("anna", "anna"))
     assert SlowChild.made == 1
     assert second.endswith("is in use: anna")
+
+
+@pytest.mark.parametrize("what", ["write-back", "restore"])
+def test_who_does_not_operate_a_drive_writes_nothing_into_it(tmp_path, what):
+    hall = DriveTable(id="hall3", name="Pump 7", url="tcp://127.0.0.1:9", profile="simulated")
+    parts = make_parts(Settings(tmp_path / "runs", tmp_path / "data", file=ServiceFile(drives=[hall])))
+    run = "20240105-081500-simulated-000abc"
+    make_run(tmp_path / "runs", run, origin={"drive": "hall3"})
+    parts.desk.pages.opened("at the page")
+    parts.desk.control("hall3").take(Party("at the page", "otto"))
+    with pytest.raises(Refusal) as refused:
+        asyncio.run(act(parts, run, what, "token", SimpleNamespace(party=Party("another", "olga"))))
+    assert (refused.value.problem.status, refused.value.problem.title) == (409, "otto operates this drive")
 
 
 def test_a_stop_reaches_a_run_whose_process_is_not_there_yet(parts):

@@ -1,4 +1,4 @@
-"""What cannot be read: a body that is no JSON, a run's result that somebody changed, and what nobody foresaw."""
+"""What cannot be read: a body that is no JSON, a run that somebody changed, and what nobody foresaw."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from starlette.testclient import TestClient
 
+from commissioner.errors import DataRefused
+from commissioner.operations.export import export_model
 from commissioner.service.access.gate import CSP
 from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings
@@ -61,6 +63,27 @@ def test_a_result_that_somebody_changed_ends_no_list_and_no_page(tmp_path: Path,
     assert [run["run"] for run in client.get("/api/runs").json()["runs"]] == [bad, good]
     shown = client.get(f"/runs/{bad}", headers=page)
     assert shown.status_code == 200 or (shown.status_code == 422 and "is damaged" in shown.text)
+
+
+def test_a_damaged_journal_ends_every_export_as_on_the_command_line(tmp_path: Path) -> None:
+    run, runs = "20240105-081500-simulated-000abc", tmp_path / "runs"
+    folder = make_run(runs, run, result=result_of(run, MACHINE))
+    kept = tmp_path / "data" / "exports" / f"{run}.csv"  # made when the run was asked for before
+    kept.parent.mkdir(parents=True)
+    kept.write_text("time_s\n", "utf-8")
+    client = TestClient(create_app(make_parts(Settings(runs, tmp_path / "data"))), base_url="http://127.0.0.1")
+    assert client.get(f"/api/runs/{run}/export/json").json()["run"] == run
+    assert client.get(f"/api/runs/{run}/export/csv").text == "time_s\n"
+    journal = folder / "journal.jsonl"
+    journal.write_text(journal.read_text("utf-8").replace("SIM-INV-7A", "SIM-INV-7B"), "utf-8")
+    with pytest.raises(DataRefused) as refused:
+        export_model(runs, run, tmp_path / "out.json", "json")
+    for form in ("json", "csv"):
+        answer = client.get(f"/api/runs/{run}/export/{form}")
+        assert answer.status_code == 422
+        assert [answer.json()[key] for key in ("title", "step", "value")] == [
+            refused.value.what, refused.value.step, refused.value.value,
+        ]  # fmt: skip
 
 
 def test_what_nobody_foresaw_is_a_page_with_its_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,6 +152,16 @@ def test_a_port_without_a_wire_speaks_to_the_simulator_by_the_drive_file():
     assert math.isfinite(port.stats.latency_s(1.0))
 
 
+def test_a_drive_in_memory_has_its_faults_from_the_request_that_they_name():
+    drawn = simulator().draw("abb_2k2", 3, spread=0.0, effects=(), noise_a=None, faults=["clamps_current:2.5@2"])
+    port, setup = InProcessPort(drawn.station), drawn.station.drive.firmware.setup
+    seen = []
+    for _ in range(3):
+        port.read(load_profile("simulated").item("status_word").address, 1)
+        seen.append(setup.most_current_a)
+    assert seen == [math.inf, 2.5, 2.5]
+
+
 def test_spread_moves_the_truth_and_not_the_plate():
     draws = [
         simulator().draw("haumer_132m04", seed, spread=0.2, effects=(), noise_a=None, faults=()) for seed in (1, 2)
@@ -193,7 +203,12 @@ def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "says"), [('effects = ["rust"]', "rust is unknown"), ('faults = ["nonsense:3"]', "nonsense:3")]
+    ("key", "says"),
+    [
+        ('effects = ["rust"]', "rust is unknown"),
+        ('faults = ["nonsense:3"]', "nonsense:3"),
+        ('faults = ["late:0.1"]', "'late' is one of a line"),  # in memory there is none
+    ],
 )
 def test_a_name_that_the_simulator_does_not_know_ends_the_study_before_its_first_case(tmp_path, key, says):
     file = study_file(
