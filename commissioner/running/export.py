@@ -106,10 +106,8 @@ def machine_of(document: Mapping[str, Any], *, is_plain: bool) -> tuple[Machine,
     from commissioner.estimation.record import scales_of
 
     left_out = {n for names in document["effect_numbers"].values() for n in names} if is_plain else set()
-    theta = np.zeros(COUNT)
-    machine = Machine(
-        theta, np.zeros((1, STATES)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, COUNT)), bool(document["has_shaft"])
-    )
+    first, knots, beside = (np.zeros((1, count)) for count in (STATES, 2, COUNT))
+    machine = Machine(np.zeros(COUNT), first, knots, knots, beside, bool(document["has_shaft"]))
     values = {**DEFAULTS, **{str(n): float(v) for n, v in document["numbers"].items() if n not in left_out}}
     unknown = [n for n in values if n not in AT]
     if unknown:
