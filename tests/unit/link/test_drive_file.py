@@ -44,6 +44,12 @@ def test_every_shipped_file_is_consistent(name):
     assert profile.file.endswith(f"{name}.toml")
 
 
+def test_no_two_shipped_files_are_of_one_drive():
+    """A file that was copied and kept the other's name would pass for it in every list."""
+    names = [load_profile(name).name for name in known_drives()]
+    assert len(set(names)) == len(names)
+
+
 def test_the_map_is_read_as_it_is_written():
     profile = load_profile("simulated")
     assert len(profile.items) == len(SIMULATED["items"])
