@@ -49,6 +49,8 @@ def drawn_aside(problem: Problem, fit: Fit) -> Array:
     take up): a start tells the bars, one steady load leaves them as they are usual.
     """
     kept = [c for c in (Column("p", AT[name]) for name in EVERY_MOTOR) if c not in fit.columns]
+    if not kept:
+        return np.zeros((0, len(fit.columns)))
     along = jacobian(problem, fit.machine, kept)
     taken = along @ fit.jacobian.T @ fit.influence()
     own = along - taken @ fit.jacobian

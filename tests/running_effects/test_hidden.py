@@ -12,6 +12,7 @@ from commissioner.estimation.fit import Column, Fit, Machine, Problem
 from commissioner.running import identification
 from commissioner.running.identification import identify
 from tests.running_effects.cases import Case, taken
+from tests.running_effects.start import FOUR, PLATE, started
 
 
 @pytest.mark.parametrize("course", ["steady", "start"])
@@ -34,6 +35,14 @@ def test_an_iron_loss_that_a_start_tells_is_taken_out_of_the_four(seed: int) -> 
     assert r_r.value == pytest.approx(truth["inverse_gamma"]["rotor_resistance_ohm"], rel=2e-3)
     assert r_r.std < 0.015 * r_r.value
     assert any("an iron loss" in r for r in found.remarks)
+
+
+def test_iron_and_bars_that_one_start_tells_are_both_in_the_fit() -> None:
+    """Nothing that is in every motor is left to be hidden then."""
+    found = identify([started(PLATE, iron_conductance=0.02, bar_resistance=1.0)], PLATE)
+    r_r = found.parameters["rotor_resistance_ohm"]
+    assert abs(r_r.value - FOUR["rotor_resistance"]) < 3.0 * r_r.std
+    assert any("an iron loss and current displacement in the bars" in r for r in found.remarks)
 
 
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
