@@ -30,7 +30,7 @@ from commissioner.run.archive.blocks import append_frame, frame, read_blocks
 from commissioner.run.archive.documents import damaged, open_no_link
 from commissioner.run.archive.journal import Journal, read_journal
 from commissioner.run.archive.origin import machine_part, this_process
-from commissioner.run.archive.seal import CLOSED, covers, seal
+from commissioner.run.archive.seal import CLOSED, TO_COME, cover_of, covered_files, covers, seal, to_come
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.index import note
@@ -92,7 +92,10 @@ class RunFolder:
         return self.save_text(name, json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
 
     def save_text(self, name: str, text: str) -> Path:
+        """Write it whole or not at all. What takes the place of a covered file is journalled before: killed between, either is known."""
         target = self.path / name
+        if name in self._covered:
+            self.journal(TO_COME, {"files": {name: cover_of(text.encode())}}, durable=True)
         with whole_file(target) as part, open(part, "w", encoding="utf-8", newline="\n", opener=open_no_link) as file:
             file.write(text)
             file.flush()
@@ -149,10 +152,12 @@ def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path |
 
 
 def _covered_before(path: Path) -> dict[str, Any]:
-    """What the last closing record covers: files that this session does not write stay covered as they were."""
-    closed = [line["record"] for line in read_journal(path / "journal.jsonl") if line["kind"] == CLOSED]
-    files = closed[-1].get("files") if closed and isinstance(closed[-1], dict) else None
-    return dict(files) if isinstance(files, dict) else {}
+    """What the last closing record covers: files that this session does not write stay covered as they were, or as a session that was
+    killed before it closed the folder had announced them, where they are that."""
+    records = read_journal(path / "journal.jsonl")
+    announced = to_come(records)
+    came = {name: wanted for name, wanted in announced.items() if covers(path, [name]).get(name) == wanted}
+    return {**covered_files([record for record in records if record["kind"] == CLOSED][-1:]), **came}
 
 
 def _sync_folder(path: Path) -> None:

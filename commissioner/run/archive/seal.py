@@ -10,14 +10,14 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict
 
 from commissioner.errors import UsageError
 
-CLOSED = "folder_closed"
-"""Kind of the record."""
+CLOSED, TO_COME = "folder_closed", "file_to_come"
+"""Kinds of records: of every file as it is; of one that is about to take another's place."""
 SHORTEST_KEY, LONGEST_KEY = 16, 65536
 """Bytes."""
 NOT_COVERED = ("journal.jsonl", "blocks.bin", "summary.json")
@@ -51,6 +51,11 @@ def read_key(path: Path) -> bytes:
     return key
 
 
+def cover_of(data: bytes) -> Covered:
+    """Size and SHA-256 of a file that is to hold this."""
+    return {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+
+
 def cover(path: Path) -> Covered:
     """Size and SHA-256 of one file."""
     with path.open("rb") as file:
@@ -62,6 +67,21 @@ def covers(folder: Path, names: Iterable[str]) -> dict[str, Covered]:
     """Of each of the files that is there and that the chain does not cover by itself."""
     wanted = [name for name in sorted(names) if name not in NOT_COVERED]
     return {name: cover(folder / name) for name in wanted if (folder / name).is_file()}
+
+
+def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Names and digests of what these records of a journal speak of, the last one of each."""
+    found: dict[str, Any] = {}
+    for line in records:
+        files = line["record"].get("files") if isinstance(line["record"], dict) else None
+        found |= files if isinstance(files, dict) else {}
+    return found
+
+
+def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What a session that was killed before it closed the folder had said would take a file's place: the file may be either."""
+    last = max((number for number, line in enumerate(journal) if line["kind"] == CLOSED), default=len(journal))
+    return covered_files(line for line in journal[last + 1 :] if line["kind"] == TO_COME)
 
 
 def seal(key: bytes, previous: str, record: Mapping[str, Any]) -> dict[str, str]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.run.archive.documents import Loss
 from commissioner.run.archive.journal import FIRST, Line, Record, read_lines
-from commissioner.run.archive.seal import CLOSED, cover, is_sealed_by
+from commissioner.run.archive.seal import CLOSED, cover, covered_files, is_sealed_by, to_come
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import read_file
 
@@ -62,9 +62,9 @@ def verify(folder: Path, key: bytes | None = None) -> Verified:
         *_journal_losses(lines),
         *_end_losses(folder, whole, is_over=is_over),
         *_block_losses(folder, whole, damage, is_over=is_over),
-        *_file_losses(folder, closed),
+        *_file_losses(folder, whole),
     ]
-    said, broken_seal = _seal(closed, key)
+    said, broken_seal = _seal(folder, whole, key)
     losses += broken_seal
     state = DAMAGED if losses else UNVERIFIED if not is_chained else INTACT if is_over and closed else CUT_OFF
     lost_samples = sum(d.lost_samples or 0 for d in damage)
@@ -82,7 +82,7 @@ def losses_at_sight(folder: Path) -> tuple[Loss, ...]:
     return (
         *_journal_losses(lines),
         *_end_losses(folder, whole, is_over=_is_over(whole)),
-        *_file_losses(folder, _closings(whole)),
+        *_file_losses(folder, whole),
     )
 
 
@@ -252,13 +252,13 @@ def _first_unlike(data: bytes, whole: list[Record]) -> int | None:
 
 
 # --- files -----------------------------------------------------------------------------------------------------------
-def _file_losses(folder: Path, closed: list[Record]) -> Iterator[Loss]:
-    files = closed[-1]["record"].get("files") if closed else {}
-    for name, wanted in (files if isinstance(files, dict) else {}).items():
+def _file_losses(folder: Path, whole: list[Record]) -> Iterator[Loss]:
+    announced = to_come(whole)
+    for name, wanted in covered_files(_closings(whole)[-1:]).items():
         path = folder / Path(str(name)).name
         if not path.is_file():
             yield Loss(str(name), None, "the file is gone")
-        elif (seen := cover(path)) != wanted:
+        elif (seen := cover(path)) not in (wanted, announced.get(name)):
             size = wanted.get("bytes") if isinstance(wanted, dict) else None
             yield Loss(
                 str(name), None,
@@ -266,8 +266,9 @@ def _file_losses(folder: Path, closed: list[Record]) -> Iterator[Loss]:
             )  # fmt: skip
 
 
-def _seal(closed: list[Record], key: bytes | None) -> tuple[str, list[Loss]]:
+def _seal(folder: Path, whole: list[Record], key: bytes | None) -> tuple[str, list[Loss]]:
     """What is to be said of the seal; with a key, a run without a valid one is a loss."""
+    closed = _closings(whole)
     sealed = [record for record in closed if record["record"].get("seal")]
     if key is None:
         return ("sealed with a key, not checked" if sealed else "none"), []
@@ -278,18 +279,18 @@ def _seal(closed: list[Record], key: bytes | None) -> tuple[str, list[Loss]]:
     last = sealed[-1]
     if not is_sealed_by(key, last.get("previous"), last["record"]):
         return "wrong", [Loss("journal.jsonl", last["n"], "the seal is not of this key, or what it covers was changed")]
-    if last is closed[-1]:
+    if last is closed[-1] and not to_come(whole):
         return "valid", []
     said = f"valid up to record {last['n']}; what was added after it has none"
-    return said, list(_changed_since(last, closed[-1]))
+    return said, list(_changed_since(folder, last))
 
 
-def _changed_since(sealed: Record, last: Record) -> Iterator[Loss]:
-    """Files that a later closing record without a seal covers otherwise than the sealed one: anybody can have written that. The page
-    is left out: it follows from the others, and whoever restores without the key writes on top of it that he did."""
-    now, then = last["record"].get("files"), sealed["record"].get("files")
-    for name, wanted in then.items() if isinstance(then, dict) else ():
-        if name != PAGE and (not isinstance(now, dict) or now.get(name) != wanted):
+def _changed_since(folder: Path, sealed: Record) -> Iterator[Loss]:
+    """Files that are no longer what the seal covers, by records without one: anybody can have written those. The page is left out: it
+    follows from the others, and whoever restores without the key writes on top of it that he did."""
+    for name, wanted in covered_files([sealed]).items():
+        path = folder / Path(str(name)).name
+        if name != PAGE and path.is_file() and cover(path) != wanted:
             yield Loss(str(name), None, f"it was changed after record {sealed['n']}, the last that the key sealed")
 
 
@@ -314,6 +315,8 @@ def _remarks(folder: Path, whole: list[Record], *, is_torn: bool, is_chained: bo
         yield "made by a version without a chain of digests: what was changed with care cannot be seen"
     else:
         yield "a chain without a seal does not stop somebody who computes it anew; --seal KEYFILE does"
+    for name in to_come(whole):
+        yield f"{name}: it or what was to take its place; the process that wrote it was killed before it closed the folder"
     if is_torn:
         yield "the last line of the journal is torn, as a kill or a power loss leaves it: no whole record is lost; a copy leaves it out"
     started: Any = whole[0]["record"] if whole and whole[0]["kind"] == "run_started" else None

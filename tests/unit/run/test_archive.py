@@ -5,7 +5,7 @@ import os
 import re
 import sqlite3
 import stat
-from contextlib import closing
+from contextlib import closing, nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -309,6 +309,33 @@ def test_a_closing_record_without_the_key_covers_no_other_file_than_the_sealed_o
         forged.save_text(name, '{"in_use": {"stator_resistance": 3.3}}')
     assert [loss.file for loss in verify(sealed.path, key).losses] == files
     assert verify(sealed.path).losses == ()
+
+
+@pytest.mark.parametrize("is_saved", [False, True])
+@pytest.mark.parametrize("name", ["report.html", "result.json"])
+def test_a_session_killed_while_it_replaced_a_covered_file_leaves_the_run_intact(tmp_path, monkeypatch, name, is_saved):
+    key = b"a key of thirty-two bytes or so."
+    with closing(RunFolder.create(tmp_path, "killed", key)) as first:
+        first.journal("run_ended", {"outcome": "commissioned"})
+        first.save_text(name, "written as the run ended")
+    again = RunFolder(first.path, key)
+    with monkeypatch.context() as killed:
+        if not is_saved:
+            killed.setattr("commissioner.run.archive.folder.whole_file", lambda _target: 1 / 0)
+        with nullcontext() if is_saved else pytest.raises(ZeroDivisionError):
+            again.save_text(name, "written a day later")
+        killed.setattr(again, "cover", lambda: None)
+        again.close()
+    found = verify(first.path)
+    assert found.losses == () and any(name in remark for remark in found.remarks)
+    unsealed = [loss.file for loss in verify(first.path, key).losses]
+    assert unsealed == (["result.json"] if is_saved and name == "result.json" else [])
+    (first.path / name).write_text("written by another")
+    assert [loss.file for loss in verify(first.path).losses] == [name]
+    (first.path / name).write_text("written a day later" if is_saved else "written as the run ended")
+    RunFolder(first.path, key).close()
+    assert (verify(first.path, key).losses, verify(first.path, key).seal) == ((), "valid")
+    assert not any(name in remark for remark in verify(first.path).remarks)
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
