@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from commissioner.estimation.hidden import LEAST_GAIN
+
 
 @dataclass(frozen=True)
 class Rules:
     """Chi-squares are those of whitened residuals, divided by what is left a sample where that is above 1."""
 
-    least_gain: float = 36.0
+    least_gain: float = LEAST_GAIN
     """A cause gains at least so much: six standard deviations. 30 nulls had no score above 25."""
     each_further_number: float = 10.0
     """And so much more for every further number of its form."""

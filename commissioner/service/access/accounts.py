@@ -65,6 +65,9 @@ class Accounts:
         self._known[name] = Account(name, role, self._hasher.hash(password))
         self._save()
 
+    def is_last_administrator(self, name: str) -> bool:
+        return [account.name for account in self.all() if account.role is Role.ADMINISTRATOR] == [name]
+
     def remove(self, name: str) -> None:
         """UsageError: there is none of this name."""
         if self.find(name) is None:

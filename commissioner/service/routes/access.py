@@ -140,6 +140,11 @@ async def add_account(request: Request, wish: NewAccount, who: Administrator) ->
 async def remove_account(request: Request, name: str, who: Administrator) -> RemovedAccount:
     """No longer an account; its sessions end."""
     parts = parts_of(request)
+    if await asyncio.to_thread(parts.accounts.is_last_administrator, name):
+        raise Refusal(
+            409, f"{name} is the last administrator", step="remove an account", value=name, limit="one that stays",
+            remedy="add another one before; `commissioner accounts remove` at the computer removes any",
+        )  # fmt: skip
     await asyncio.to_thread(parts.accounts.remove, name)
     parts.sessions.end_all_of(name)
     await parts.note(who, "removed an account", name=name)

@@ -399,6 +399,15 @@ def test_an_administrator_adds_and_removes_accounts(client, accounts):
     refused(client.delete("/api/accounts/eve", headers=token), 422)
 
 
+def test_the_last_administrator_stays(client, accounts):
+    token = log_in(client, "ada")
+    refused(client.delete("/api/accounts/ada", headers=token), 409)
+    wish = {"name": "eve", "password": "long enough", "role": "administrator"}
+    assert client.post("/api/accounts", json=wish, headers=token).status_code == 201
+    assert client.delete("/api/accounts/ada", headers=token).status_code == 200
+    refused(client.get("/api/accounts"), 401)
+
+
 def test_whoever_sits_at_the_computer_is_operator_until_there_is_an_account(client, parts):
     assert client.get("/api/audit").status_code == 200
     refused(client.get("/api/accounts"), 403)
