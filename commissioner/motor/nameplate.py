@@ -244,13 +244,54 @@ BETWEEN_LINES = (math.sqrt(3.0), 2.0)
 """Between two readings of one plate: 230/400 V, star or delta, and 230/460 V, halves of a winding in parallel or in series."""
 
 
+KW_PER_HP = 0.7457
+
+
 def _of_two_lines(plate: Nameplate, efficiency: float) -> str:
-    """The two readings that would fit where voltage and current are of different connections."""
+    """The two readings that would fit where voltage and current are of different connections; or the power, where hp were taken for kW."""
     off = efficiency / typical_efficiency(plate.rated_power_w, plate.pole_pairs)
+    if 1.0 < off < math.sqrt(BETWEEN_LINES[0] / KW_PER_HP):
+        return f": {KW_PER_HP * plate.rated_power_w:.4g} W would fit, a number of hp taken for kW"
     up = min((k if off < 1.0 else 1.0 / k for k in BETWEEN_LINES), key=lambda k: abs(math.log(k * off)))
     if not LEAST_OF_TYPICAL < up * off < 1.25:
         return ""
     return (
         f": {plate.rated_voltage_v:.4g} V with {plate.rated_current_a / up:.3g} A would fit, or "
         f"{plate.rated_voltage_v / up:.4g} V with {plate.rated_current_a:.4g} A"
+    )
+
+
+MOST_LOSSES = 1.65
+"""Of the typical losses, what a plate can say without a question: 1.59 at most in tests/data/motors, IE1 motors of 0.12 to 200 kW and two to
+eight poles 1.41 (IEC 60034-30-1). A power in kW taken for one in hp makes 1.7 to 5 of IE1 to IE3 motors from 1.5 kW on."""
+MOST_SLIP = 0.17
+"""Of small motors: 0.17 at most of catalogues' 0.06 kW ones; 60 Hz beside a speed at 50 Hz makes 0.19 and more."""
+
+
+def plate_doubt(plate: Nameplate) -> str:
+    """Of a plate that `check` lets pass, what is unusual about it: value, limit and the readings that would fit; nothing of others."""
+    return " ".join(said for said in (_lossy(plate), _slow(plate)) if said)
+
+
+def _lossy(plate: Nameplate) -> str:
+    efficiency = plate.rated_power_w / (
+        math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
+    )
+    typical = typical_efficiency(plate.rated_power_w, plate.pole_pairs)
+    least = 1.0 - MOST_LOSSES * (1.0 - typical)
+    if efficiency >= least:
+        return ""
+    return (
+        f"the plate means an efficiency of {efficiency:.3g}, where motors of {plate.rated_power_w:.4g} W have {least:.2g} or more: read power, "
+        f"voltage, current and power factor again ({plate.rated_power_w / KW_PER_HP:.4g} W would fit, a number of kW taken for hp, or "
+        f"{plate.rated_current_a / math.sqrt(2.0):.3g} A, a peak value taken for an rms one)"
+    )
+
+
+def _slow(plate: Nameplate) -> str:
+    if plate.rated_slip <= MOST_SLIP:
+        return ""
+    return (
+        f"the plate means a slip of {plate.rated_slip:.2g}, where motors have {MOST_SLIP:g} at most: speed and frequency (50 or 60 Hz) must be of "
+        "one line"
     )

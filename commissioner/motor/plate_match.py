@@ -30,6 +30,9 @@ inverter that loses much a small current shows too little inductance."""
 OTHER_CONNECTION = 3.0
 """All impedances over the plate's (or the inverse) of a motor wired in star for delta. It may be that where this factor makes a plate's
 motor of it: the table's then draw 0.28 ... 0.53 of the plate's current, or 2.5 ... 4.8 times it."""
+MOST_DRAWN = 1.45
+"""Current at standstill, under a first test's tones, over that of the plate's typical motor of the same resistance: at most 1.23 in the table,
+wired in delta for star 1.37 ... 3.2 times. Only of a motor whose first current showed little inductance, and that is about to pass its current."""
 SURELY_OTHERWISE = 2.45
 """From which factor on it is said to be that: below sqrt(6) a current scale of 2 is no less likely. The geometric mean of the impedances and
 of the current's inverse is 2.67 ... 3.35 in the table but for five motors, whose plates are a factor of 1.26 ... 1.7 off."""
@@ -119,6 +122,17 @@ def inductance_mismatch(inductance_h: float, std_h: float, plate: Nameplate) -> 
     return _of_scale(
         "the inductance is not that of the plate's motor", ratio, f"at most {MOST_INDUCTIVE:g} of the plate's typical",
         ratio, plate, ratio if is_star else None,
+    )  # fmt: skip
+
+
+def current_mismatch(over_typical: float, plate: Nameplate) -> PlateMismatch | None:
+    """Of what a motor draws at standstill under its first tones, over what the plate's typical one would: the only look at one that draws so
+    much that its test has to end."""
+    if over_typical <= MOST_DRAWN:
+        return None
+    return _of_scale(
+        "the motor draws more than the plate's motor would", over_typical, f"at most {MOST_DRAWN:g} times the plate's typical",
+        1.0 / over_typical, plate, over_typical if plate.connection == "star" else None,
     )  # fmt: skip
 
 

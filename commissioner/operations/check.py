@@ -9,7 +9,7 @@ from pathlib import Path
 
 from commissioner.encoding import HIDDEN
 from commissioner.errors import CheckFailed, ErrorDocument
-from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.nameplate import Nameplate, plate_doubt, prior
 from commissioner.procedure.checks import CheckResult, NotChecked, check_failed
 from commissioner.procedure.plan import BELOW_TRIP, Job, ProcedurePlan
 from commissioner.records import DriveIdentity
@@ -78,7 +78,7 @@ def check(request: CheckRequest) -> Checked:
     failure = check_failed(seen.checks)
     return Checked(
         outcome="rejected" if failure else "passed",
-        reason=failure.what if failure else _passed(seen),
+        reason=failure.what if failure else _passed(seen, plate_doubt(nameplate)),
         error=failure.as_dict() if failure else None,
         drive=seen.identity,
         nameplate_in_drive=seen.nameplate,
@@ -93,12 +93,14 @@ def check(request: CheckRequest) -> Checked:
     )
 
 
-def _passed(seen: Inspection) -> str:
-    """Where no register tells which drive answers, the person has to look: a sister type answers alike."""
+def _passed(seen: Inspection, doubt: str) -> str:
+    """With what is unusual about the plate. Where no register tells which drive answers, the person has to look: a sister type answers alike."""
     left = f"every check that this drive file allows passed, {len(seen.not_checked)} could not be made"
     if any(row.name == WHICH for row in seen.not_checked):
         left += f", among them whether this is a {seen.identity.drive_type}: compare the label"
-    return f"{left if seen.not_checked else 'every check passed'}; nothing was energised or written"
+    return f"{left if seen.not_checked else 'every check passed'}; nothing was energised or written" + (
+        f"; but {doubt}" if doubt else ""
+    )
 
 
 def limits_of(job: Job, rated_drive_current_a: float) -> RunLimits:

@@ -176,7 +176,11 @@ _OTHERS = re.compile(rf"(?<![a-z]){_KIND}?[acst](?![a-z])", re.IGNORECASE)
 _OF_A_PHASE = re.compile(rf"(?<![a-z]){_KIND}(?=[ryb]{{0,2}}n?(?![a-z]))", re.IGNORECASE)
 _COMPONENT = re.compile(rf"({CURRENT}|{VOLTAGE})s?(alpha|beta)(?:ref|soll|set|cmd|command|act|ist|mess|meas)?")
 """Of a vector: `i_alpha`, `uβ`, `us_alpha_ref`."""
-_OF_CHANNEL = re.compile(r"^(?:ch|chan|channel|kanal)[ ._]?\d+(?:[-_.]\d+)?[ .:_-]+(?=[^\W\d])", re.IGNORECASE)
+_ROW_NUMBER = re.compile(r"n[°º]\.?", re.IGNORECASE)
+"""A count of rows in French, Italian and Spanish; no speed n with a degree sign."""
+_OF_CHANNEL = re.compile(
+    r"^(?:ch|chan|channel|kanal|kanaal|voie|canale?)[ ._]?\d+(?:[-_.]\d+)?[ .:_-]+(?=[^\W\d])", re.IGNORECASE
+)
 """An instrument's own name of a channel, before that which somebody gave it: `CH1 Ia`."""
 _LOOSE = re.compile(
     r"[\[(](?P<before>[^\])]+)[\])]\s*(?P<after>\S.*)|(?P<name>.*[^\s.-])(?:\s+-\s*|\.|\s+)(?P<unit>[^\s.]{1,6})"
@@ -197,6 +201,8 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
     """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
     if CONTRACT.fullmatch(name):
         return name
+    if _ROW_NUMBER.fullmatch(name.strip()):
+        return None
     raw, last = name, _PARAMETER.sub("", _without_path(name))
     name = translated(name if last.isdigit() else last)
     if _NEUTRAL.fullmatch(key_of(IN_NAME.sub("", name))):

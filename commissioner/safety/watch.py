@@ -11,6 +11,10 @@ from commissioner.errors import Aborted, DriveFault
 from commissioner.records import DriveStatus, SampleBlock, peak
 
 TOO_LATE = "the samples came too late"
+AFTER_OVER_CURRENT = (
+    "check the connection (wired in delta for star a motor draws up to three times), the cable and the current sensors' scale, reset the fault "
+    "at the drive, start again"
+)
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,9 @@ def judge_status(status: DriveStatus, limits: WatchLimits) -> StopReason | None:
             f"the drive tripped: {status.fault_text}",
             status.trip_value,
             status.trip_limit,
-            "remove the cause, reset the fault at the drive, start again",
+            AFTER_OVER_CURRENT
+            if status.trip_unit == "A"
+            else "remove the cause, reset the fault at the drive, start again",
             is_fault=True,
             unit=status.trip_unit,
         )

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.motor.nameplate import Nameplate, check
+from commissioner.motor.nameplate import Nameplate, check, plate_doubt
 from commissioner.recordings.whole import write_text
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
@@ -215,12 +215,14 @@ def questions(plate: Nameplate) -> list[str]:
 def _of_efficiency(plate: Nameplate) -> list[str]:
     low, high = usual_efficiency(plate)
     efficiency = efficiency_of(plate)
-    if low <= efficiency <= high:
+    if low <= efficiency <= high and not plate_doubt(plate):
         return []
     if low <= efficiency * math.sqrt(3) <= high:
         return ["star voltage with delta current?"]
     if low <= efficiency / math.sqrt(3) <= high:
         return ["delta voltage with star current?"]
+    if low <= efficiency * math.sqrt(2) <= high:
+        return ["a power in kW taken for one in hp, or a peak current?"]
     return ["is a number misread?"]
 
 

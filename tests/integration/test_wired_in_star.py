@@ -56,3 +56,73 @@ def test_a_first_current_that_told_too_little_is_followed_by_a_larger_one(tmp_pa
     assert seen.stator_inductance_h == pytest.approx(0.32, abs=3 * seen.stator_inductance_std_h)
     assert seen.stator_inductance_std_h < 0.02
     assert run.station.highest_flux_wb < run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))
+
+
+LARGE_IN_DELTA = """extends = "default"
+[machine]
+id = "sps_50hp_400v_50hz"
+stator_resistance_ohm = 0.02744
+rotor_resistance_ohm = 0.01767
+leakage_inductance_h = 0.000502
+inductance_h = 0.012525
+saturation_at_rated_flux = 16.4
+[power_stage]
+switching_frequency_hz = 2500.0
+dead_time_knee_a = 1.55
+threshold_knee_a = 1.03
+slope_ohm = 0.0016
+[sensors]
+full_scale_a = 205.0
+noise_a = 0.13
+offset_a = [0.32, -0.23, 0.15]
+[drive]
+rated_current_a = 84.0
+hardware_current_limit_a = 201.0
+"""
+"""37 kW, wired in delta where the plate says star: a third of the impedances, a saturated third of the flux."""
+
+
+@pytest.mark.parametrize("seed", [1, 5])
+def test_a_large_motor_wired_in_delta_for_star_is_named_before_the_drive_trips(tmp_path, seed):
+    """The first tones went from a tenth to nine tenths in one step: the drive tripped, and nothing was said of the wiring."""
+    scenario = tmp_path / "delta.toml"
+    scenario.write_text(LARGE_IN_DELTA, encoding="utf-8")
+    run = commissioned(tmp_path / "runs", Pace(), str(scenario), seed, axes=(0.0,))
+    assert run.ended.outcome == "rejected"
+    assert "wired in delta where the plate says star" in run.ended.reason
+    assert run.station.highest_flux_wb < 0.6 * run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))
+
+
+LOSSY_IN_STAR = """extends = "default"
+[machine]
+id = "msl_18kw5"
+stator_resistance_ohm = 0.56
+rotor_resistance_ohm = 0.4394
+leakage_inductance_h = 0.01264
+inductance_h = 0.3675
+saturation_at_rated_flux = 0.015
+[power_stage]
+switching_frequency_hz = 5000.0
+dead_time_s = 5e-6
+threshold_v = 2.4
+dead_time_knee_a = 0.79
+threshold_knee_a = 0.53
+slope_ohm = 0.003
+[sensors]
+full_scale_a = 105.0
+noise_a = 0.066
+offset_a = [0.16, -0.12, 0.08]
+[drive]
+rated_current_a = 42.7
+hardware_current_limit_a = 102.0
+"""
+
+
+def test_a_second_first_current_is_no_larger_than_the_first_one_permits(tmp_path):
+    """2.7 +- 1.9 times the plate's inductance after the first, five times in truth: the second one reached 1.55 of the flux limit."""
+    scenario = tmp_path / "star.toml"
+    scenario.write_text(LOSSY_IN_STAR, encoding="utf-8")
+    run = commissioned(tmp_path / "runs", Pace(), str(scenario), 4, axes=(0.0,), connection="delta")
+    assert run.ended.outcome == "rejected"
+    assert "wired in star where the plate says delta" in run.ended.reason
+    assert run.station.highest_flux_wb < 1.02 * run.job.flux_limit_wb(0.24)

@@ -75,7 +75,7 @@ class _Seen:
 class FluxGuard:
     """One per energised stretch, starting at rest. `latency_s` is from sample to the command that answers it taking
     effect (link both ways); `reaction_s` what the drive's amplitude ramp takes; `current_a` is the peak current that the
-    amplitude aims at, `trip_a` the one at which the drive ends the test: half-way between them the guard acts; `held_v` as in `Amplitude`."""
+    amplitude aims at, `trip_a` the one at which the drive ends the test: half-way between them the guard acts; `held_v`, `thirstiest` as in `Amplitude`."""
 
     limit_wb: float
     latency_s: float
@@ -88,6 +88,7 @@ class FluxGuard:
     current_a: float = math.inf
     trip_a: float = math.inf
     held_v: float = 0.0
+    thirstiest: InverseGamma | None = None
     began_s: float = 0.0
     """Time between the excitation's start and the first sample."""
     _integral: Signal = field(default_factory=lambda: np.zeros(2), init=False)
@@ -107,18 +108,19 @@ class FluxGuard:
         self._forecast = Forecast.behind(self.inverter, self.excitation, self.axis_deg)
         plateau_v = max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
         self._amplitude = Amplitude(
-            self._forecast, self.limit_wb, self.current_a, plateau_v, self.sample_period_s, self.held_v
-        )
+            self._forecast, self.limit_wb, self.current_a, plateau_v, self.sample_period_s, self.held_v,
+            self.thirstiest,
+        )  # fmt: skip
 
     @property
     def safe_scale(self) -> float:
         """The scale at which no motor whatever can pass the flux limit."""
         return self._amplitude.safe
 
-    @property
+    @cached_property
     def first_scale(self) -> float:
         """The scale to begin with on a motor that was given a direct voltage before."""
-        return self._amplitude.first
+        return self._amplitude.first_for(self.trip_a)
 
     def begin_known(self, machine: InverseGamma, log_std: float, ramp_per_s: float) -> float:
         """The scale to begin with on a machine measured before to `log_std`."""
@@ -197,6 +199,8 @@ class FluxGuard:
             is_quiet = max(r.flux_wb for r in self._recent) < QUIET * self.limit_wb
             is_quiet &= max(r.current_a for r in self._recent) < QUIET_CURRENT * self.current_a
             wanted = self._amplitude.unsure(estimate.parameters, scale) if is_quiet else scale
+            if self.thirstiest is not None:
+                wanted = min(wanted, max(scale, self.first_scale))
         else:
             r_s, _r_r, _l_s, l_m = estimate.parameters.as_tuple()
             s = estimate.std

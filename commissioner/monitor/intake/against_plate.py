@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 
 from commissioner.monitor.intake.findings import Audited, Finding, miswired
-from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.nameplate import Nameplate, plate_doubt
 from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, disagreement, doubt
 from commissioner.motor.running import from_nameplate, slip_at_lag
 from commissioner.records import ReadingNote, RunningRecording
@@ -66,9 +66,9 @@ def unscaled_order_deg(audited: Audited, shaft_hz: float | None, plate: Nameplat
 
 
 def doubt_of(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Finding | None:
-    """A note of a factor that lies between the usual and a contradiction."""
+    """A note of a factor that lies between the usual and a contradiction, and of a plate that is unusual in itself."""
     point = _point(audited, shaft_hz, plate)
-    said = "" if point is None else doubt(point, plate)
+    said = "; ".join(s for s in (plate_doubt(plate), "" if point is None else doubt(point, plate)) if s)
     return Finding("plate_doubt", "note", said) if said else None
 
 

@@ -25,12 +25,13 @@ from commissioner.identify.document import document as identification_document
 from commissioner.identify.estimate.axis import Estimator
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.plate_match import contradiction, doubt, rated_point, sure_mismatch
+from commissioner.motor.plate_match import contradiction, rated_point, sure_mismatch
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.ranges import require_distinct
 from commissioner.operations.recordings.intake import require_independent
 from commissioner.operations.recordings.trust import (
     Trust,
+    doubts,
     refused,
     trust_from,
     trusted_data,
@@ -173,10 +174,10 @@ def _with_the_plate(
     """What was identified, and what was decided where it contradicts the plate. DataRefused: nobody decided."""
     found = analyse(recording, plate, estimator)
     rated = rated_point(found.parameters, plate)
-    against, said = contradiction(rated, plate), doubt(rated, plate)
+    against, said = contradiction(rated, plate), doubts(rated, plate)
     other = sure_mismatch(found.parameters, found.std[0], plate)
     if against is None and other is None:
-        return found, [said] if said else []
+        return found, said
     if trust == "data":
         return found, [trusted_data(against) if against else f"{other.what}: the data were trusted" if other else ""]
     if trust == "plate" and against is not None and against.likely is not None:

@@ -7,8 +7,8 @@ from typing import Literal, cast
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.plate_match import Contradiction, contradiction, doubt, rated_point
+from commissioner.motor.nameplate import Nameplate, plate_doubt
+from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, doubt, rated_point
 from commissioner.records import Signal, StandstillRecording
 
 Trust = Literal["plate", "data"]
@@ -39,12 +39,17 @@ def trusted_data(found: Contradiction) -> str:
 def judged(circuit: InverseGamma, plate: Nameplate, trust: Trust | None) -> list[str]:
     """What the circuit says against the plate; DataRefused where they contradict each other, unless the data are to be trusted."""
     rated = rated_point(circuit, plate)
-    against, said = contradiction(rated, plate), doubt(rated, plate)
+    against, said = contradiction(rated, plate), doubts(rated, plate)
     if against is None:
-        return [said] if said else []
+        return said
     if trust != "data":
         raise refused(against)
     return [trusted_data(against)]
+
+
+def doubts(rated: OperatingPoint, plate: Nameplate) -> list[str]:
+    """What is unusual about the plate itself, and beside what a circuit draws at its rated point; a sentence each."""
+    return [said for said in (plate_doubt(plate), doubt(rated, plate)) if said]
 
 
 def trusted_plate(factor: float) -> str:

@@ -65,7 +65,9 @@ def excite(job: Job, findings: Findings) -> Step:
     is_first = findings.tests_done == 0
     if is_first:
         look_s = (BLIND_LOOK if findings.link.captured else FIRST_LOOK) * seconds
-        yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
+        looked = yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
+        if isinstance(looked, PlateMismatch):
+            return (yield from reject(findings, (Objection(**asdict(looked)),)))
         yield from _look(job, findings)
         mismatch = _mismatch(job, findings)
         if mismatch is not None:
@@ -81,6 +83,8 @@ def excite(job: Job, findings: Findings) -> Step:
     longest_s = max(seconds, left_s)
     chosen = _design(job, findings, seconds)
     played_s = yield from _test(job, findings, axis_deg, chosen, seconds, longest_s, bias_s=bias_s)
+    if isinstance(played_s, PlateMismatch):
+        return (yield from reject(findings, (Objection(**asdict(played_s)),)))
     findings.excitations.append(chosen.cut_to(played_s))
     findings.tests_done += 1
     if findings.tests_done == len(job.plan.tests_deg):
@@ -152,11 +156,11 @@ def _test(
     *,
     is_look: bool = False,
     bias_s: float = 0.0,
-) -> Generator[Command, Any, float]:
+) -> Generator[Command, Any, float | PlateMismatch]:
     """One energised multitone session: raise the amplitude as the guard permits, end when the time is up and settled.
 
     An estimate that has not settled after `seconds` gets more time, up to `longest_s`; then `bias_s` on a DC bias. Returns
-    the seconds of tones that were played.
+    the seconds of tones that were played, or what speaks against this being the plate's motor, the output off.
     """
     tones = tuple((t.amplitude_v, t.frequency_hz, t.phase_rad) for t in chosen.excitation.tones)
     yield Tell(
@@ -180,6 +184,10 @@ def _test(
     while not under_test.is_done(longest_s):
         block = yield from next_block(findings, STEP, axis_deg)
         reading = under_test.take(block)
+        overdrawn = under_test.overdrawn(reading)
+        if overdrawn is not None:
+            yield Disarm(overdrawn.what)
+            return overdrawn
         wanted = under_test.answer(reading)
         if wanted is not None:
             if reading.advice is FluxAdvice.BACK_OFF:

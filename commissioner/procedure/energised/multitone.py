@@ -14,7 +14,7 @@ from commissioner.identify.batch.problem import Problem
 from commissioner.identify.batch.segments import Segment
 from commissioner.identify.excite.amplitude import Amplitude
 from commissioner.identify.excite.current_flux import CurrentFlux
-from commissioner.identify.excite.flux_guard import FluxAdvice, FluxGuard, FluxReading
+from commissioner.identify.excite.flux_guard import BACK_OFF_ABOVE, FluxAdvice, FluxGuard, FluxReading
 from commissioner.identify.excite.forecast import Forecast
 from commissioner.identify.excite.tones import DesignedExcitation, Excitation, ExcitationLimits, Tone, design
 from commissioner.identify.intake.averaged import on_its_period
@@ -26,7 +26,9 @@ from commissioner.identify.observer.coordinates import PRIOR_LOG_STD
 from commissioner.identify.observer.observer import BlockEstimate, ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.plate_match import MOST_INDUCTIVE, OTHER_CONNECTION, SURE, PlateMismatch, current_mismatch
 from commissioner.procedure.energised.ceilings import aimed_current_a, tripping_current_a
+from commissioner.procedure.energised.overdrawn import Drawn
 from commissioner.procedure.energised.session import along_axis, duration_s, tone_period_s
 from commissioner.procedure.findings import AxisFinished, EstimateUpdated
 from commissioner.procedure.plan import Job
@@ -58,7 +60,7 @@ class UnderTest:
         self._job, self._findings, self._axis_deg, self._seconds = job, findings, axis_deg, seconds
         start = findings.estimate or plate_machine(job, findings)
         log_std = KNOWN_LOG_STD if findings.is_measured else PRIOR_LOG_STD
-        inverter = findings.inverter
+        inverter, thirstiest = findings.inverter, _thirstiest(job, findings, start)
         self._observer = ParallelObserver(
             prior(job.nameplate), sample_s, job.nameplate.rated_current_peak_a, start=start, start_log_std=log_std,
             compensation=_compensation(inverter, axis_deg, job.trip_current_a),
@@ -66,12 +68,13 @@ class UnderTest:
         self._guard = FluxGuard(
             job.flux_limit_wb(resistance_ohm), job.link_latency_s, chosen.excitation, sample_s, resistance_ohm,
             inverter, axis_deg, current_a=aimed_current_a(job, findings), trip_a=tripping_current_a(job, findings),
-            held_v=findings.held_v,
+            held_v=findings.held_v, thirstiest=thirstiest,
         )  # fmt: skip
         first = min(job.plan.excitation.first_scale, self._guard.first_scale)
         if findings.is_measured:
             first = self._guard.begin_known(start, log_std, job.scale_ramp_per_s)
         self.scale = self._most_asked = first
+        self._drawn = None if thirstiest is None else Drawn(start, inverter, axis_deg, sample_s)
         self._excitation = chosen.excitation
         self._wakes_a = min(KNEES * inverter.knee_a, EXCITED * chosen.peak_current_a)
         self._is_awake = False
@@ -102,6 +105,8 @@ class UnderTest:
         self._is_awake |= peak(current) >= self._wakes_a
         voltage_v = on_its_period(block.voltage_axis_v, block.averaged)
         self.require_asked(block)
+        if self._drawn is not None:
+            self._drawn.take(voltage_v, current, block.lost_before)
         self._estimate = self._observer.advance(voltage_v, current, block.lost_before, adapts=self._is_awake)
         taken_s = duration_s(block)
         self.time_s += taken_s
@@ -123,6 +128,17 @@ class UnderTest:
         self.peak_fraction = max(self.peak_fraction, reached_wb / self.limit_wb)
         self._findings.peak_flux_fraction = max(self._findings.peak_flux_fraction, self.peak_fraction)
         return FluxReading(reached_wb, reached_wb, predicted_wb / self.limit_wb, 0.0, FluxAdvice.HOLD, self.scale)
+
+    def overdrawn(self, reading: FluxReading) -> PlateMismatch | None:
+        """Where a motor that may be wired in delta for star is about to pass the current aimed at: whether it can be the plate's at all."""
+        if (
+            self._drawn is None
+            or reading.advice is not FluxAdvice.BACK_OFF
+            or reading.current_fraction < BACK_OFF_ABOVE
+        ):
+            return None
+        drawn = self._drawn.over_typical
+        return None if drawn is None else current_mismatch(drawn, self._job.nameplate)
 
     def answer(self, reading: FluxReading) -> float | None:
         """The amplitude to ask for now, or None to leave it. Raises Aborted where the guard says so."""
@@ -204,6 +220,25 @@ def plate_machine(job: Job, findings: Findings) -> InverseGamma:
     rest_h = findings.first_current.stator_inductance_h - machine.leakage_inductance_h
     within_h = min(max(rest_h, box.lower.magnetizing_inductance_h), box.upper.magnetizing_inductance_h)
     return replace(machine, magnetizing_inductance_h=within_h)
+
+
+def _thirstiest(job: Job, findings: Findings, machine: InverseGamma) -> InverseGamma | None:
+    """The motor of a plate in star as it would be wired in delta, with the resistance that was measured; None where it was measured, or its
+    first current showed an inductance that no such wiring has."""
+    seen = findings.first_current
+    if findings.is_measured or job.nameplate.connection != "star":
+        return None
+    typical = prior(job.nameplate).typical
+    typical_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
+    least_h = 0.0 if seen is None else seen.stator_inductance_h - SURE * seen.stator_inductance_std_h
+    if least_h > MOST_INDUCTIVE / OTHER_CONNECTION * typical_h:
+        return None
+    return replace(
+        machine,
+        rotor_resistance_ohm=machine.rotor_resistance_ohm / OTHER_CONNECTION,
+        leakage_inductance_h=machine.leakage_inductance_h / OTHER_CONNECTION,
+        magnetizing_inductance_h=typical.magnetizing_inductance_h / OTHER_CONNECTION,
+    )
 
 
 def warm_up(nameplate: Nameplate) -> None:

@@ -20,7 +20,7 @@ from commissioner.identify.inverter.settling import Approach, Settled, settle
 from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
-from commissioner.motor.plate_match import inductance_mismatch
+from commissioner.motor.plate_match import MOST_INDUCTIVE, OTHER_CONNECTION, inductance_mismatch
 from commissioner.motor.standstill import poles_per_s
 from commissioner.procedure.energised import ceilings
 from commissioner.procedure.energised.direct_current import STEER_S, DirectCurrent
@@ -36,10 +36,13 @@ from commissioner.safety.commands import Command, SetBias, SetDriveLimits, Tell
 STEP, FIRST_STEP = "DC staircase", "first current"
 RUNGS, UNKNOWN_RUNGS, FIRST_LOWER = (1.0, 0.6, 0.3), (0.6, 0.3), 0.55
 """DC levels of one sign, of the top current; on an unknown motor those before the top; the lower of the first current."""
-FIRST_SHARES, TOLD = (0.2, 0.45), 0.5
+FIRST_SHARES, TOLD = (0.2, 0.45, 0.45), 0.5
 """The first current, of the top that the plate's most inductive motor could take; once more at the larger where the smaller told the
-inductance to no better than this part of a typical one. An inverter that loses 21 V left 4.6 A of 25.7 A to look with after the smaller
+inductance to no better than this part of a typical one, and a third time where that one had to stay below it. An inverter that loses 21 V left 4.6 A of 25.7 A to look with after the smaller
 alone (0.14 +- 0.07 H for 0.07 H), and R_s unknown; with the larger, three times the inductance still keeps 0.9 of the flux limit."""
+DOUBT = 4.0
+"""Standard errors of the inductance that a larger first current reckons with where a star for delta is possible. An 18.5 kW motor wired so
+(unsaturated 5 times the plate's typical), seen as 2.7 +- 1.9 times behind 42 V lost, was taken to 1.55 of the flux limit by the larger one."""
 TOP, KNOWN_TOP = 0.9, 0.95
 """Flux of the top DC level, of the limit, and of a machine that is known at its worst (`Findings.at_worst`)."""
 SLOWLY_STEERED = 0.8
@@ -75,11 +78,12 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     axis_deg = job.plan.tests_deg[findings.tests_done]
     findings.axis_s = 0.0
     for share in FIRST_SHARES if findings.first_current is None else ():
-        seen, typical_h = yield from _first_current(job, findings, axis_deg, share)
+        is_larger = findings.first_current is not None
+        seen, typical_h, was_held_back = yield from _first_current(job, findings, axis_deg, share)
         mismatch = inductance_mismatch(seen.stator_inductance_h, seen.stator_inductance_std_h, job.nameplate)
         if mismatch is not None:
             return (yield from reject(findings, (Objection(**asdict(mismatch)),)))
-        if seen.stator_inductance_std_h < TOLD * typical_h:
+        if seen.stator_inductance_std_h < TOLD * typical_h or (is_larger and not was_held_back):
             break
     stair = _Stair(job, findings, axis_deg)
     yield from stair.begin(stair.ceilings())
@@ -115,10 +119,25 @@ def settled_points(climbed: Sequence[DcLevel], held: Sequence[DcLevel]) -> tuple
     )
 
 
+def _most_first_a(job: Job, findings: Findings, flux_wb: float) -> float:
+    """What a first current may be of a motor that may be wired in star for delta, by what a smaller one has told of it; infinite where
+    nothing has, and for a plate in star, which no connection makes more inductive."""
+    seen = findings.first_current
+    if seen is None or job.nameplate.connection != "delta":
+        return math.inf
+    typical = prior(job.nameplate).typical
+    most_h = min(
+        seen.stator_inductance_h + DOUBT * seen.stator_inductance_std_h,
+        OTHER_CONNECTION * MOST_INDUCTIVE * (typical.leakage_inductance_h + typical.magnetizing_inductance_h),
+    )
+    return TOP * flux_wb / most_h
+
+
 def _first_current(
     job: Job, findings: Findings, axis_deg: float, share: float
-) -> Generator[Command, Any, tuple[FirstCurrent, float]]:
-    """This share of the current, then half of that: the static inductance of the motor that is really there, and a typical one."""
+) -> Generator[Command, Any, tuple[FirstCurrent, float, bool]]:
+    """This share of the current, then half of that: the static inductance of the motor that is really there, a typical one, and whether less
+    was given than this share."""
     stair = _Stair(job, findings, axis_deg, first_share=share)
     yield from stair.begin(stair.ceilings())
     yield from stair.climb(1.0)
@@ -133,7 +152,7 @@ def _first_current(
     yield Tell(
         FirstCurrentSeen(axis_deg, of_typical=of_typical, peak_flux_fraction=stair.peak_fraction, energised_s=stair.seconds, **asdict(seen))
     )  # fmt: skip
-    return seen, typical_h
+    return seen, typical_h, stair.is_held_back
 
 
 class _Stair(DirectCurrent):
@@ -156,6 +175,9 @@ class _Stair(DirectCurrent):
         slow, fast = poles_per_s(machine)
         self._slow_s, self._fast_s = -1.0 / slow, -1.0 / fast
         self._top_a = (first_share or 1.0) * self._plan.top_current_a
+        most_a = _most_first_a(job, findings, flux_wb) if is_first else math.inf
+        self.is_held_back = self._top_a > most_a
+        self._top_a = min(self._top_a, most_a)
         if findings.link.captured and not is_first:
             self._top_a *= SLOWLY_STEERED
         if self._known is not None:

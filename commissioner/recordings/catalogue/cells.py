@@ -49,7 +49,9 @@ def split_unit(printed: str) -> tuple[str, str] | None:
 
 
 def unit_key(unit: str) -> str:
-    """A unit without spaces, dots and brackets, in lower case."""
+    """A unit without spaces, dots and brackets, in lower case; what counts turns a minute (`r.p.m.`) as it is."""
+    if (plain := re.sub(r"[\s\[\]()]", "", unit).lower().rstrip(";,")) in PER_MINUTE:
+        return plain
     return re.sub(r"[\s·*\[\]()]|(?<=[gfp])\.(?=m)|(?<=b)[.-](?=ft²|ft2)", "", unit).lower().rstrip(";,")
 
 

@@ -51,7 +51,9 @@ INDEX, LEAST_ROWS = "__index_level_0__", 16
 """What pandas calls an index without a name in Parquet (in CSV nothing), and rows from which on its steps tell what it is."""
 SAME_VALUE = 0.05
 """Of the largest value, by which two columns of one current or voltage may differ: one of them was rounded, or filtered."""
-CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
+CHANNEL = re.compile(
+    r"(?:ch|chan|channel|kanal|kanaal|voie|canale?|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE
+)
 """What an instrument calls a channel that nobody has named."""
 _QUANTITY = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D\S*)?")
 

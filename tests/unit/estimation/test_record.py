@@ -261,3 +261,15 @@ def test_a_motor_that_starts_is_not_said_to_stand(has_speed):
         PLATE,
     )
     assert record.not_started == () and record.refusal_of_standing("identify") is None
+
+
+@pytest.mark.parametrize(("supply_hz", "is_read"), [(50.02, True), (49.98, True), (50.4, True), (52.0, False)])
+def test_2_khz_are_40_samples_a_period_of_the_mains_as_they_are(supply_hz, is_read):
+    """2000 samples a second at 50 Hz were refused by `too few`, with 2000 as the limit: the mains stood at 50.000002 Hz."""
+    recording, plate = slow(supply_hz, 2000.0 / supply_hz, 3.0)
+    try:
+        prepare([recording], plate)
+    except DataRefused as refused:
+        assert ("too few" in refused.what) is not is_read
+    else:
+        assert is_read

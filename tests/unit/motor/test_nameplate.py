@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, check, prior, rated_flux
+from commissioner.motor.nameplate import Nameplate, check, plate_doubt, prior, rated_flux
 from commissioner.motor.quantities import plate_words
 from tests.support.standstill import usable_motors
 
@@ -156,3 +156,54 @@ def test_a_plate_is_told_to_four_digits_and_without_an_exponent(plate, said):
     names = ("rated_power_w", "rated_voltage_v", "rated_current_a", "rated_speed_rpm")
     assert plate_words(dict(zip(names, plate, strict=True)), "star") == said
     assert plate_words({"rated_power_w": 2200.0}) == ""
+
+
+IE1 = {
+    1: {120: 0.45, 180: 0.528, 370: 0.639, 750: 0.721, 2200: 0.797, 11000: 0.876, 90000: 0.93, 200000: 0.94},
+    2: {120: 0.50, 180: 0.57, 370: 0.66, 750: 0.721, 2200: 0.797, 11000: 0.876, 90000: 0.93, 200000: 0.94},
+    3: {120: 0.383, 180: 0.455, 370: 0.597, 750: 0.70, 2200: 0.777, 7500: 0.847, 90000: 0.93, 200000: 0.94},
+    4: {120: 0.31, 180: 0.38, 370: 0.497, 750: 0.612, 2200: 0.719, 7500: 0.81, 30000: 0.885, 90000: 0.914},
+}
+"""IEC 60034-30-1 at 50 Hz: the least efficient motors on the market, by pole pairs and watts."""
+
+
+def ie1_plates(share_of_losses=1.0):
+    """Plates of motors with this share of the losses of IE1."""
+    for pairs, motors in IE1.items():
+        for power_w, efficiency in motors.items():
+            better = 1.0 - share_of_losses * (1.0 - efficiency)
+            yield dataclasses.replace(
+                PLATE, rated_power_w=float(power_w), rated_current_a=power_w / (np.sqrt(3) * 400 * 0.75 * better),
+                power_factor=0.75, pole_pairs=pairs, rated_speed_rpm=2850.0 / pairs,
+            )  # fmt: skip
+
+
+def test_no_plate_of_the_table_and_none_of_the_least_efficient_class_is_doubted():
+    honest = [*(m.plate for m in usable_motors() if not check(m.plate)), *ie1_plates()]
+    assert [plate for plate in honest if check(plate) or plate_doubt(plate)] == []
+
+
+@pytest.mark.parametrize("share_of_losses", [1.0, 0.6])
+def test_a_power_in_kw_taken_for_one_in_hp_is_doubted_from_2_kw_on_or_30_kw_of_slow_ones(share_of_losses):
+    """IE1, and IE3 with 0.6 of its losses. Of smaller ones efficiency does not tell: an IE3 motor so read is an IE1 motor."""
+    for plate in ie1_plates(share_of_losses):
+        if plate.rated_power_w >= (2200.0 if plate.pole_pairs <= 2 else 30e3):
+            misread = dataclasses.replace(plate, rated_power_w=0.7457 * plate.rated_power_w)
+            said = plate_doubt(misread) or check(misread)[0].expected
+            assert check(misread) or f"{plate.rated_power_w:.4g} W would fit, a number of kW taken for hp" in said
+
+
+@pytest.mark.parametrize("power_w", [750.0, 2200.0, 90000.0])
+def test_a_number_of_hp_taken_for_kw_is_refused_with_the_power_that_fits(power_w):
+    (plate,) = (p for p in ie1_plates(0.6) if p.rated_power_w == power_w and p.pole_pairs == 2)
+    (problem,) = check(dataclasses.replace(plate, rated_power_w=power_w / 0.7457))
+    assert f"{power_w:.4g} W would fit, a number of hp taken for kW" in problem.expected
+
+
+def test_a_small_motors_60_hz_beside_its_speed_at_50_hz_is_doubted():
+    small = dataclasses.replace(
+        PLATE, rated_power_w=180.0, rated_current_a=0.6, power_factor=0.7, rated_speed_rpm=1370.0
+    )
+    assert plate_doubt(small) == "" and check(small) == ()
+    of_60 = dataclasses.replace(small, rated_frequency_hz=60.0)
+    assert check(of_60) == () and "a slip of 0.24" in plate_doubt(of_60)

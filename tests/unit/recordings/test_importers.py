@@ -64,6 +64,10 @@ CHANNELS = [np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) for k in range(3)]
         ("VSN", "voltage_v_v"),
         ("Zeitstempel", "time_s"),
         ("voltage", None),
+        ("N°", None),
+        ("n°.", None),
+        ("Nº", None),
+        ("n", "speed_rad_per_s"),
     ],
 )
 def test_column_names_are_understood(name: str, meaning: str | None) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
+from commissioner.recordings.catalogue.plate_said import plate_said
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.names import unit_of
 from commissioner.recordings.units import read_unit
@@ -217,3 +218,11 @@ def test_a_temperature_is_known_with_its_zero_and_is_no_time(tmp_path, unit, pri
         written(tmp_path / "x.csv", ["# sample_period_s: 0.0002", f"T [{unit}],ia,ib,uab,ubc"], 20 + TIME)
     ).columns
     assert columns["time_s"][1] == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize("unit", ["r.p.m.", "[r.p.m.]", "R.P.M.", "rpm", "min⁻¹", "tr/min", "giri/min", "U/min"])
+@pytest.mark.parametrize("name", ["Velocidad nominal", "Giri nominali", "Revoluciones nominales", "Nenndrehzahl"])
+def test_the_plates_speed_is_read_with_what_counts_turns_a_minute(name, unit):
+    """Of `r.p.m.` one dot was taken off, as of `kg.m²`: the plate lacked its speed."""
+    said, notes = plate_said({name: f"1164 {unit}"}, "x.csv")
+    assert said == {"rated_speed_rpm": 1164.0} and [n.code for n in notes] == ["plate_said"]

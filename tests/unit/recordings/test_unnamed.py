@@ -92,3 +92,26 @@ def test_what_is_ambiguous_is_asked_for(tmp_path, change):
     with pytest.raises(DataRefused) as refused:
         read_running(written(tmp_path / "scope.csv", amps, volts, units=units), motor=motor)
     assert "--map" in refused.value.remedy
+
+
+@pytest.mark.parametrize("word", ["Kanal", "Voie", "Canal", "Canale", "Kanaal", "Channel"])
+def test_channels_without_names_in_other_languages_are_told_alike(tmp_path, word):
+    amps, volts = phasors(0.03)
+    path = written(tmp_path / "scope.csv", amps, volts)
+    path.write_text(path.read_text("utf-8").replace("CH", f"{word} "), "utf-8")
+    seen = read_running(path, motor=PLATE)
+    assert [n.code for n in seen.notes if n.code == "named_by_signals"]
+    assert np.max(np.abs(seen.currents_a[0])) == pytest.approx(abs(amps[0]), rel=0.06)
+
+
+@pytest.mark.parametrize(
+    "said", ["Fréquence d'échantillonnage : 5 kHz", "Frecuencia de muestreo: 5 kHz", "Pas de temps : 0.2 ms", "Zeitschritt: 200 µs",
+             "Frequenza di campionamento: 5000 Hz", "Paso de tiempo: 0.2 ms"],
+)  # fmt: skip
+def test_the_rate_above_columns_without_a_time_is_read_in_other_languages(tmp_path, said):
+    amps, volts = phasors(0.03)
+    lines = written(tmp_path / "scope.csv", amps, volts).read_text("utf-8").splitlines()
+    rows = "\n".join(line.partition(",")[2] for line in lines[2:])
+    path = tmp_path / "rate.csv"
+    path.write_text(f"{said}\nI1 (A),I2 (A),I3 (A),U12 (V),U23 (V),U31 (V)\n{rows}\n", "utf-8")
+    assert read_running(path, motor=PLATE).sample_period_s == pytest.approx(2e-4)

@@ -127,6 +127,12 @@ def test_each_status_reason_is_named(changes, says, is_fault):
     assert stop.remedy
 
 
+@pytest.mark.parametrize(("unit", "names"), [("A", True), ("V", False), ("", False)])
+def test_what_tripped_on_its_current_may_be_wired_otherwise(unit, names):
+    stop = judge_status(replace(STATUS, fault_code=1, fault_text="it", trip_unit=unit), LIMITS)
+    assert ("wired in delta for star" in stop.remedy) is names and "reset the fault at the drive" in stop.remedy
+
+
 def test_a_healthy_status_is_no_reason_to_stop():
     assert judge_status(STATUS, LIMITS) is None
     assert judge_status(replace(STATUS, heatsink_degc=85.0, winding_degc=120.0), LIMITS) is None
