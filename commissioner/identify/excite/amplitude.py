@@ -35,7 +35,7 @@ STRIDE, HALVINGS = 4, 7
 class Amplitude:
     """`limit_wb`: stator flux never to be passed; `current_a`: peak current aimed at; `plateau_v`: what the inverter takes
     of the axis voltage at large currents; `held_v`: a direct voltage that the motor was given, its flux staying below the limit;
-    `thirstiest`: the machine of least impedance that the motor may be, where it may be another than the plate's."""
+    `least_impedance`: the machine of least impedance that the motor may be, where it may be another than the plate's."""
 
     forecast: Forecast
     limit_wb: float
@@ -43,7 +43,7 @@ class Amplitude:
     plateau_v: float
     sample_period_s: float
     held_v: float = 0.0
-    thirstiest: InverseGamma | None = None
+    least_impedance: InverseGamma | None = None
 
     @property
     def safe(self) -> float:
@@ -65,11 +65,11 @@ class Amplitude:
 
     def first_for(self, trip_a: float) -> float:
         """`first`, at which the machine of least impedance draws no more than half-way from the current aimed at to `trip_a` either."""
-        if self.thirstiest is None or math.isinf(trip_a):
+        if self.least_impedance is None or math.isinf(trip_a):
             return self.first
         step_s = STRIDE * self.sample_period_s
         peaks = self.forecast.ahead(
-            self.thirstiest, np.arange(step_s, self.forecast.excitation.duration_s, step_s), loss=SURE_LOSS
+            self.least_impedance, np.arange(step_s, self.forecast.excitation.duration_s, step_s), loss=SURE_LOSS
         )
         return _largest(0.0, self.first, lambda scale: peaks(scale)[1] < 0.5 * (self.current_a + trip_a))
 

@@ -75,7 +75,7 @@ class _Seen:
 class FluxGuard:
     """One per energised stretch, starting at rest. `latency_s` is from sample to the command that answers it taking
     effect (link both ways); `reaction_s` what the drive's amplitude ramp takes; `current_a` is the peak current that the
-    amplitude aims at, `trip_a` the one at which the drive ends the test: half-way between them the guard acts; `held_v`, `thirstiest` as in `Amplitude`."""
+    amplitude aims at, `trip_a` the one at which the drive ends the test: half-way between them the guard acts; `held_v`, `least_impedance` as in `Amplitude`."""
 
     limit_wb: float
     latency_s: float
@@ -88,7 +88,7 @@ class FluxGuard:
     current_a: float = math.inf
     trip_a: float = math.inf
     held_v: float = 0.0
-    thirstiest: InverseGamma | None = None
+    least_impedance: InverseGamma | None = None
     began_s: float = 0.0
     """Time between the excitation's start and the first sample."""
     _integral: Signal = field(default_factory=lambda: np.zeros(2), init=False)
@@ -109,7 +109,7 @@ class FluxGuard:
         plateau_v = max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
         self._amplitude = Amplitude(
             self._forecast, self.limit_wb, self.current_a, plateau_v, self.sample_period_s, self.held_v,
-            self.thirstiest,
+            self.least_impedance,
         )  # fmt: skip
 
     @property
@@ -199,7 +199,7 @@ class FluxGuard:
             is_quiet = max(r.flux_wb for r in self._recent) < QUIET * self.limit_wb
             is_quiet &= max(r.current_a for r in self._recent) < QUIET_CURRENT * self.current_a
             wanted = self._amplitude.unsure(estimate.parameters, scale) if is_quiet else scale
-            if self.thirstiest is not None:
+            if self.least_impedance is not None:
                 wanted = min(wanted, max(scale, self.first_scale))
         else:
             r_s, _r_r, _l_s, l_m = estimate.parameters.as_tuple()

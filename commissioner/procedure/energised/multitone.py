@@ -60,7 +60,7 @@ class UnderTest:
         self._job, self._findings, self._axis_deg, self._seconds = job, findings, axis_deg, seconds
         start = findings.estimate or plate_machine(job, findings)
         log_std = KNOWN_LOG_STD if findings.is_measured else PRIOR_LOG_STD
-        inverter, thirstiest = findings.inverter, _thirstiest(job, findings, start)
+        inverter, least_impedance = findings.inverter, _if_in_delta(job, findings, start)
         self._observer = ParallelObserver(
             prior(job.nameplate), sample_s, job.nameplate.rated_current_peak_a, start=start, start_log_std=log_std,
             compensation=_compensation(inverter, axis_deg, job.trip_current_a),
@@ -68,13 +68,13 @@ class UnderTest:
         self._guard = FluxGuard(
             job.flux_limit_wb(resistance_ohm), job.link_latency_s, chosen.excitation, sample_s, resistance_ohm,
             inverter, axis_deg, current_a=aimed_current_a(job, findings), trip_a=tripping_current_a(job, findings),
-            held_v=findings.held_v, thirstiest=thirstiest,
+            held_v=findings.held_v, least_impedance=least_impedance,
         )  # fmt: skip
         first = min(job.plan.excitation.first_scale, self._guard.first_scale)
         if findings.is_measured:
             first = self._guard.begin_known(start, log_std, job.scale_ramp_per_s)
         self.scale = self._most_asked = first
-        self._drawn = None if thirstiest is None else Drawn(start, inverter, axis_deg, sample_s)
+        self._drawn = None if least_impedance is None else Drawn(start, inverter, axis_deg, sample_s)
         self._excitation = chosen.excitation
         self._wakes_a = min(KNEES * inverter.knee_a, EXCITED * chosen.peak_current_a)
         self._is_awake = False
@@ -222,7 +222,7 @@ def plate_machine(job: Job, findings: Findings) -> InverseGamma:
     return replace(machine, magnetizing_inductance_h=within_h)
 
 
-def _thirstiest(job: Job, findings: Findings, machine: InverseGamma) -> InverseGamma | None:
+def _if_in_delta(job: Job, findings: Findings, machine: InverseGamma) -> InverseGamma | None:
     """The motor of a plate in star as it would be wired in delta, with the resistance that was measured; None where it was measured, or its
     first current showed an inductance that no such wiring has."""
     seen = findings.first_current
