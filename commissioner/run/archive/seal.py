@@ -78,10 +78,14 @@ def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """What a session that was killed before it closed the folder had said would take a file's place: the file may be either."""
+def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """What sessions that were killed before one closed the folder had said would take a file's place: the file may be any of these."""
     last = max((number for number, line in enumerate(journal) if line["kind"] == CLOSED), default=len(journal))
-    return covered_files(line for line in journal[last + 1 :] if line["kind"] == TO_COME)
+    found: dict[str, list[Any]] = {}
+    for line in journal[last + 1 :]:
+        for name, wanted in covered_files([line]).items() if line["kind"] == TO_COME else ():
+            found.setdefault(name, []).append(wanted)
+    return found
 
 
 def seal(key: bytes, previous: str, record: Mapping[str, Any]) -> dict[str, str]:
