@@ -186,8 +186,13 @@ def _ready(run: RunSummary, url: str | None, key: bytes | None = None) -> _Ready
 
 
 def _circuit(run: RunSummary) -> InverseGamma:
-    """The accepted values. DataRefused: the run accepted none, or the drive holds them already."""
+    """The accepted values. DataRefused: the run accepted none, the drive holds them already, or it may hold half of them."""
     parameters = (run.result or {}).get("parameters") or {}
+    if run.is_unknown:
+        raise DataRefused(
+            f"a write-back or restore of {run.run} did not end: the drive holds its old or its new parameters", step=STEP, value=run.written,
+            limit="a drive that was read since", remedy=f"`commissioner restore {run.run}` first, then write back",
+        )  # fmt: skip
     if run.standing not in (ACCEPTED, RESTORED_SINCE) or not all(name in parameters for name in PARAMETERS):
         raise DataRefused(
             f"{run.run} has nothing to write",

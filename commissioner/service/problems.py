@@ -14,6 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from commissioner.errors import NOTHING, OF_DISK, Aborted, CommissionerError, DataRefused, DriveError, UsageError
 from commissioner.validation import wanted
@@ -155,6 +156,17 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
                 remedy=f"correct {where or 'the body'}; /openapi.json describes it",
             ),
         )
+
+    @app.exception_handler(ClientDisconnect)
+    async def gone(request: Request, _error: ClientDisconnect) -> Response:
+        """Nobody reads it; without it each such request is told on the console as a defect."""
+        return answer(
+            request,
+            Refusal(
+                400, "the request broke off before its end", step="read the request", value="a part of its body",
+                limit="as much as its head said", remedy="send it again",
+            ),
+        )  # fmt: skip
 
     @app.exception_handler(HTTPException)
     async def plain(request: Request, error: HTTPException) -> Response:

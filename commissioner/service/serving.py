@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
+import queue
 import socket
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,6 +20,8 @@ from commissioner.service.configuration import Settings, bracketed, check_may_li
 from commissioner.service.parts import make_parts
 
 OPEN_FILES = 10_000
+MOST_RECORDS, LAST_WORDS_S = 1000, 1.0
+"""Of the log, while the console takes none; so long it may take the last ones."""
 
 
 def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> None:
@@ -51,7 +56,8 @@ def _serve(settings: Settings, ready: Callable[[str], None]) -> None:
         timeout_graceful_shutdown=8,
         timeout_keep_alive=20,
     )
-    _Server(config, parts.closing.set).run(sockets=[listening])
+    with _told_apart(logging.getLogger("uvicorn")):
+        _Server(config, parts.closing.set).run(sockets=[listening])
 
 
 class _Server(uvicorn.Server):
@@ -64,6 +70,41 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._closing()
         await super().shutdown(sockets)
+
+
+class _Aside(logging.Handler):
+    """Takes records without ever waiting: what finds no place is lost."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.records: queue.Queue[logging.LogRecord | None] = queue.Queue(MOST_RECORDS)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(queue.Full):
+            self.records.put_nowait(record)
+
+
+@contextmanager
+def _told_apart(logger: logging.Logger) -> Iterator[None]:
+    """What is logged inside goes to the console by a thread of its own: a terminal that is held (Ctrl-S), or a pipe that nobody reads,
+    would else stand the whole service still, STOP included."""
+    handlers, aside = logger.handlers, _Aside()
+
+    def tell() -> None:
+        while (record := aside.records.get()) is not None:
+            for handler in handlers:
+                handler.handle(record)
+
+    telling = threading.Thread(target=tell, name="log", daemon=True)
+    logger.handlers = [aside]
+    telling.start()
+    try:
+        yield
+    finally:
+        logger.handlers = handlers
+        with suppress(queue.Full):
+            aside.records.put_nowait(None)
+        telling.join(LAST_WORDS_S)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -35,6 +35,10 @@ class Habits:
     """Takes a write without its unlock in silence, instead of refusing it."""
     busy_s: float = 0.0
     """So long after each write it refuses the next as busy."""
+    late_s: float = 0.0
+    """So long after a parameter is written it still shows the value before."""
+    refuses_from: int | None = None
+    """From this parameter on, counted from 1, it takes none that is written."""
 
 
 @dataclass
@@ -65,6 +69,8 @@ class VendorDrive:
         self.stored: dict[int, int] = {}
         self.coils = {face.store_coil: False} if face.store_coil is not None else {}
         self.entered: dict[int, int] = {}
+        self.shown: dict[int, tuple[float, int]] = {}
+        self.written = 0
         self.tunings: list[Tuning] = []
         self.state, self.speed, self.is_on = REST, 0, True
         self.turned = self.was_energised_s = 0.0
@@ -137,6 +143,7 @@ class VendorDrive:
         """Off and on: what was not stored is gone."""
         self.words = dict(self.stored)
         self.entered.clear()
+        self.shown.clear()
         self.coils = dict.fromkeys(self.coils, False)
         self.state, self.speed = REST, 0
         self.is_locked = bool(self.face.unlocks)
@@ -177,7 +184,11 @@ class VendorDrive:
         if any(address + k not in self.words for k in range(count)):
             return bytes((0x83, BAD_ADDRESS))
         self._refresh()
-        return struct.pack(f">BB{count}H", 3, 2 * count, *(self.words[address + k] for k in range(count)))
+        return struct.pack(f">BB{count}H", 3, 2 * count, *(self._shown(address + k) for k in range(count)))
+
+    def _shown(self, address: int) -> int:
+        until_s, word = self.shown.get(address, (0.0, 0))
+        return word if self._clock() < until_s else self.words[address]
 
     def _write(self, address: int, words: list[int], longest: int) -> int:
         """0 taken; an exception's number; -1 taken in silence."""
@@ -202,7 +213,7 @@ class VendorDrive:
 
     def _words_of(self, cell: Cell) -> list[int]:
         self._refresh()
-        return [self.words[cell.address + k] for k in range(cell.width)]
+        return [self._shown(cell.address + k) for k in range(cell.width)]
 
     def _put_from_outside(self, cell: Cell, words: Sequence[int]) -> int:
         """As `_write`: what the drive's state has to say to it, and whether it is locked."""
@@ -237,6 +248,8 @@ class VendorDrive:
     def _take(self, cell: Cell, words: Sequence[int]) -> int:
         facts = (self.face.tune or {}).get("facts", {})
         new = {cell.address + k: word for k, word in enumerate(words)}
+        if cell.name in self.face.parameters and not self._agrees(new):
+            return BAD_VALUE
         if cell.name == facts.get("stop", {}).get("item"):
             self.words |= new
             return self._command(words[0])
@@ -252,6 +265,13 @@ class VendorDrive:
             self.motor.plate[cell.name] = cell.to_value(words)
             self._compute_at = self._clock() + RECOMPUTE_S
         return 0
+
+    def _agrees(self, new: Iterable[int]) -> bool:
+        """To a parameter that is written at these addresses; whether it shows it at once is another question."""
+        self.written += 1
+        until_s = self._clock() + self.habits.late_s
+        self.shown |= {address: (until_s, self._shown(address)) for address in new}
+        return self.habits.refuses_from is None or self.written < self.habits.refuses_from
 
     # --- states -------------------------------------------------------------------------------------------------------
     @property

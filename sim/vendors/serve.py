@@ -30,10 +30,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--enter", action="store_true", help="values are in use after an Enter only")
     parser.add_argument("--turnaround", type=float, help="seconds before each answer; unless given, the file's")
     parser.add_argument("--busy-s", type=float, default=0.0, help="so long after a write it refuses the next")
+    parser.add_argument("--late-s", type=float, default=0.0, help="so long it shows the value before a write")
+    parser.add_argument("--refuses-from", type=int, metavar="N", help="it takes no parameter from the Nth on")
     options = parser.parse_args(arguments)
     if options.name not in faces() and not options.name.endswith(".toml"):
         parser.error(f"there is no drive named {options.name}")
-    habits = Habits(tuple(options.tuning or ["good"]), options.tuning_s, options.enter, busy_s=options.busy_s)
+    habits = Habits(
+        tuple(options.tuning or ["good"]), options.tuning_s, options.enter, busy_s=options.busy_s, late_s=options.late_s,
+        refuses_from=options.refuses_from,
+    )  # fmt: skip
     face = read_face(options.name)
     drive = VendorDrive(face, time.monotonic, habits=habits, seed=options.seed)
     _serve(drive, options.tcp, face.turnaround_s if options.turnaround is None else options.turnaround)

@@ -22,7 +22,7 @@ from commissioner.cli.screens.sentence import Sentence
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.motor.quantities import FIVE
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE, finding_sentences, standing
 from commissioner.run.archive.documents import Loss
 from commissioner.text import LONGEST, in_unit, visible
 from commissioner.text import shown as cut
@@ -192,6 +192,7 @@ _MARKS = {
     "commissioned": "[green]✓ commissioned[/]",
     ACCEPTED: f"[yellow]✓ {ACCEPTED}[/]",
     RESTORED_SINCE: f"[yellow]✓ {RESTORED_SINCE}[/]",
+    UNSURE: f"[red]? {UNSURE}[/]",
     "rejected": "[yellow]✗ rejected[/]",
     "aborted": "[yellow]■ aborted[/]",
     "faulted": "[red]✗ faulted[/]",
@@ -233,13 +234,13 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             table(
                 "",
                 ("", "value", "± 95 %", "in the drive before", "change", "written"),
-                _rows(document, "restored" if standing_now == RESTORED_SINCE else "yes"),
+                _rows(document, {RESTORED_SINCE: "restored", UNSURE: "not known"}.get(standing_now, "yes")),
                 right=(1, 2, 3, 4),
             )
         )
         for remark in (*finding_sentences(document), *document.get("remarks", ())):
             out.print(f"  [dim]•[/] {escape(signs(remark))}")
-        if standing(document) == ACCEPTED:
+        if (standing_now or standing(document)) == ACCEPTED:
             again = "" if document.get("tune") else f"`commissioner write-back {escape(str(document['run']))}` or "
             out.print(
                 f"  [dim]•[/] the drive still holds its old values; {again}the same call with --write-back writes the new ones"

@@ -7,7 +7,7 @@ One owner, no threads: the loop that fetches samples is the loop that feeds the 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from commissioner.errors import (
     CheckFailed,
@@ -294,10 +294,16 @@ class Inverter:
         """How many samples its memory keeps of a session; 0 where its file has no register for it."""
         return int(self._items.read_number("ring_capacity")) if "ring_capacity" in self.profile.items else 0
 
-    def restore(self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None) -> WriteReport:
-        """The snapshot's values in use and stored again. Refused where the drive does not hold `expected_present`."""
+    def restore(
+        self,
+        snapshot: ParameterSnapshot,
+        expected_present: Mapping[str, float] | None = None,
+        again: Collection[str] = (),
+    ) -> WriteReport:
+        """The snapshot's values in use and stored again. Refused where the drive does not hold `expected_present`. `again`: parameters
+        that are written whatever the drive shows, for something else was just written there."""
         self.profile.require("restore")
-        return self._write_back().restore(snapshot, expected_present)
+        return self._write_back().restore(snapshot, expected_present, again)
 
     def _write_back(self) -> WriteBack:
         return WriteBack(self._items, self.journal, sleep=self.sleep, clock=self.now_s)

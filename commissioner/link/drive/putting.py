@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 
 from commissioner.errors import DriveFault, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.facts import Action, Intent, Journal
@@ -60,6 +60,9 @@ class Staged:
         if self._has_asked_to_commit:
             self._stage(values)
 
+    def put_again(self, values: Values, *, store: bool) -> None:
+        """Its one commit and its result leave nothing in doubt."""
+
     def let_jobs_end(self) -> None:
         """A commit or store whose answer was lost may still be at work: what is read before it ends is not the end."""
         end = self._clock() + RESULT_DEADLINE_S
@@ -103,15 +106,21 @@ class Direct:
     ) -> None:
         self._sets, self._items, self._journal = sets, sets.items, journal
         self._sleep, self._clock = sleep, clock
+        self._sent: set[str] = set()
+        self._was_stored = False
 
     def put_in_use(self, target: Values, *, store: bool) -> None:
-        differing: dict[str, Value] = dict(self._sets.differing(target, self._sets.in_use()))
-        self._journal(Intent(Action.COMMIT, differing))
+        differing = self._sets.differing(target, self._sets.in_use())
+        self._was_stored |= store
+        self._put(differing, self._write, store=store)
+
+    def _put(self, values: Values, write: Callable[[str, Value], None], *, store: bool) -> None:
+        self._journal(Intent(Action.COMMIT, dict(values)))
         with self._unlocked():
             with self._store_mode(store):
                 for name in self._sets.group.order:
-                    if name in differing:
-                        self._write(name, differing[name])
+                    if name in values:
+                        write(name, values[name])
             for address, value in self._sets.group.enter:
                 self._items.port.write(address, [value])
 
@@ -128,6 +137,7 @@ class Direct:
 
     def _write(self, name: str, value: Value) -> None:
         """Where the answer is lost the drive is looked at, not written again: the value may have arrived."""
+        self._sent.add(name)
         try:
             self._items.give_back(name, value)
         except (ReplyTimeout, ReplyMismatch):
@@ -174,7 +184,17 @@ class Direct:
         self.put_in_memory(target)
 
     def take_back(self, values: Values) -> None:
-        """Nothing is under way."""
+        """Whatever was sent is sent once more, as it was before: a drive that shows a value late still shows the old one, and has the new."""
+        if self._sent:
+            self.put_again({name: values[name] for name in values if name in self._sent}, store=self._was_stored)
+
+    def put_again(self, values: Values, *, store: bool) -> None:
+        """Written whether the drive shows them already or not; what it refuses it has not taken before either."""
+        self._put(values, self._write_unless_refused, store=store)
+
+    def _write_unless_refused(self, name: str, value: Value) -> None:
+        with suppress(RequestRefused):
+            self._write(name, value)
 
     def let_jobs_end(self) -> None:
         """There are none."""

@@ -7,7 +7,7 @@ one by one; there the report of a failure names what it holds.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from commissioner.errors import (
@@ -70,11 +70,14 @@ class WriteBack:
         except DriveError as error:
             raise self._after_failure(error, snapshot) from error
 
-    def restore(self, snapshot: ParameterSnapshot, expected: Values | None) -> WriteReport:
-        """The snapshot's sets in use and stored. WriteBackFailed where the drive does not hold them afterwards."""
+    def restore(self, snapshot: ParameterSnapshot, expected: Values | None, again: Collection[str] = ()) -> WriteReport:
+        """The snapshot's sets in use and stored. WriteBackFailed where the drive does not hold them afterwards. `again`: what was just
+        written otherwise, and which a drive that shows it late still shows as it was."""
         present = self._check_present(snapshot, expected, None)
         self._check_stopped()
         try:
+            if again:
+                self._way.put_again({name: snapshot.in_use[name] for name in again}, store=self._sets.can_store)
             is_stored = self._bring_back(snapshot)
             return self._report(snapshot.in_use, present, is_stored=is_stored)
         except DriveError as error:

@@ -114,7 +114,7 @@ def name_motor(archive: Archive, run: str, *, tag: str, serial: str = "", confir
     summary = find_run(archive.runs, run)
     folder = Path(summary.folder)
     records = read_journal(folder / "journal.jsonl")
-    if not records or records[-1]["kind"] != CLOSED:
+    if not any(record["kind"] == CLOSED for record in records):  # a restore that was killed since leaves more behind it
         raise UsageError(
             f"{summary.run} has not been closed", step="name the motor", value=summary.outcome, limit="a run that has ended",
             remedy="wait for its end; a run that was cut off identified nothing that could be named",

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-ACCEPTED, RESTORED_SINCE = "accepted, not written", "commissioned, restored since"
-"""How a run stands that ended as commissioned while the drive does not hold its values."""
+ACCEPTED, RESTORED_SINCE, UNSURE = "accepted, not written", "commissioned, restored since", "commissioned, old or new"
+"""How a run stands that ended as commissioned while the drive does not hold its values, or nobody knows whether it does: a write-back or
+a restore since did not end."""
 
 
 def standing(result: Mapping[str, Any]) -> str:

@@ -19,7 +19,7 @@ import os
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from commissioner.encoding import plain
 from commissioner.errors import UsageError
@@ -35,16 +35,26 @@ from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.index import note
 
+if TYPE_CHECKING:
+    from filelock import FileLock
+
+LOCK = ".lock.part"
+"""Held by whoever writes into the folder; gone when it is closed. By its ending no part of the run."""
+LOCK_S = 30.0
+"""So long is waited for another writer: a session on a run that is over takes a second, on a busy computer ten."""
+
 
 class RunFolder:
-    """One run's folder, open for writing. Close it with `close`, which leaves every file covered by the journal's last
-    record, sealed where a `key` is given."""
+    """One run's folder, open for writing, by one process at a time: two that continued one chain would break it. Close it with `close`,
+    which leaves every file covered by the journal's last record, sealed where a `key` is given. UsageError: another process goes on
+    writing into it."""
 
     def __init__(self, path: Path, key: bytes | None = None) -> None:
         self.path, self.key = path, key
         for name in ("journal.jsonl", "blocks.bin"):
             if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
                 raise damaged(path, name, "a link, a pipe or a folder in its place")
+        self._lock = _sole_writer(path)
         self._covered = _covered_before(path)
         self._saved: set[str] = set()
         self._journal = Journal(path / "journal.jsonl")
@@ -136,6 +146,7 @@ class RunFolder:
         self._journal.close()
         with suppress(OSError):
             self._blocks.close()
+        _let_go(self.path, self._lock)
         note(self.path)
 
 
@@ -156,8 +167,37 @@ def _covered_before(path: Path) -> dict[str, Any]:
     killed before it closed the folder had announced them, where they are that."""
     records = read_journal(path / "journal.jsonl")
     announced = to_come(records)
-    came = {name: wanted for name, wanted in announced.items() if covers(path, [name]).get(name) == wanted}
+    seen = covers(path, announced)
+    came = {name: seen[name] for name, either in announced.items() if seen.get(name) in either}
     return {**covered_files([record for record in records if record["kind"] == CLOSED][-1:]), **came}
+
+
+def _sole_writer(path: Path) -> FileLock | None:
+    """The lock on the folder; None where its disk knows no locks. The system drops it with the process, however that ends."""
+    from filelock import FileLock, Timeout  # late: who only reads runs takes none
+
+    if not path.is_dir():
+        return None  # taking it would make the folder
+    lock = FileLock(path / LOCK, thread_local=False)
+    try:
+        lock.acquire(timeout=LOCK_S)
+    except Timeout:
+        raise UsageError(
+            f"another process writes into {path.name}", step="archive", value=str(path), limit="one writer for one run",
+            remedy="wait until the run, its restore or its diagnosis has ended, then start again",
+        ) from None  # fmt: skip
+    except OSError:  # the journal says it if nothing at all can be written
+        return None
+    return lock
+
+
+def _let_go(path: Path, lock: FileLock | None) -> None:
+    """The file goes first: who waits for it sees that it is gone, and makes another."""
+    if lock is not None:
+        with suppress(OSError):
+            (path / LOCK).unlink(missing_ok=True)
+        with suppress(OSError):
+            lock.release()
 
 
 def _sync_folder(path: Path) -> None:

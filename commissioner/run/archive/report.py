@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from commissioner.encoding import plain
-from commissioner.errors import CommissionerError
+from commissioner.errors import CommissionerError, UsageError
 from commissioner.procedure.findings import RunEnded
 from commissioner.report.page import with_notice, with_notices_of
 from commissioner.report.run.contract import RunDocument
@@ -42,10 +42,10 @@ def mark_written(run: RunSummary, key: bytes | None = None) -> None:
 
 
 def _mark(run: RunSummary, sentence: str, key: bytes | None) -> None:
-    """A disk that is full leaves the report as it is."""
+    """A disk that is full, or another process that goes on writing there, leaves the report as it is."""
     page = Path(run.folder) / "report.html"
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    with suppress(OSError), closing(RunFolder(page.parent, key)) as folder:
+    with suppress(OSError, UsageError), closing(RunFolder(page.parent, key)) as folder:
         folder.save_text(page.name, with_notice(page.read_text("utf-8"), sentence.format(when)))
 
 

@@ -31,6 +31,10 @@ class Covered(TypedDict):
     sha256: str
 
 
+Noted = Covered | Any
+"""What a journal says of a file: one that somebody else wrote may say anything."""
+
+
 def read_key(path: Path) -> bytes:
     """The bytes of a key file. UsageError: it cannot be read or is too short or too long to be one."""
     try:
@@ -69,19 +73,23 @@ def covers(folder: Path, names: Iterable[str]) -> dict[str, Covered]:
     return {name: cover(folder / name) for name in wanted if (folder / name).is_file()}
 
 
-def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Covered]:
+def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Noted]:
     """Names and digests of what these records of a journal speak of, the last one of each."""
-    found: dict[str, Covered] = {}
+    found: dict[str, Noted] = {}
     for line in records:
         files = line["record"].get("files") if isinstance(line["record"], dict) else None
         found |= files if isinstance(files, dict) else {}
     return found
 
 
-def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, Covered]:
-    """What a session that was killed before it closed the folder had said would take a file's place: the file may be either."""
+def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, list[Noted]]:
+    """What sessions that were killed before one closed the folder had said would take a file's place: the file may be any of these."""
     last = max((number for number, line in enumerate(journal) if line["kind"] == CLOSED), default=len(journal))
-    return covered_files(line for line in journal[last + 1 :] if line["kind"] == TO_COME)
+    found: dict[str, list[Noted]] = {}
+    for line in journal[last + 1 :]:
+        for name, wanted in covered_files([line]).items() if line["kind"] == TO_COME else ():
+            found.setdefault(name, []).append(wanted)
+    return found
 
 
 def seal(key: bytes, previous: str, record: Mapping[str, Any]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import DataRefused
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
 from commissioner.run.archive.documents import read_document, read_result
 from commissioner.run.archive.journal import Record, read_journal
 
@@ -21,7 +21,7 @@ NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
 AS_BEFORE, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before", "old or new", "cut off", "unreadable"
 RESTORED = f"{AS_BEFORE} (restored)"
-STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, "rejected", "aborted", "faulted", CUT_OFF, UNREADABLE)
+STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, UNSURE, "rejected", "aborted", "faulted", CUT_OFF, UNREADABLE)
 """How a run can have ended, or stand."""
 
 
@@ -71,8 +71,10 @@ class RunSummary:
     @property
     def standing(self) -> str:
         """The outcome, and whether the drive holds what came of it."""
-        if self.outcome != "commissioned" or self.is_unknown:
+        if self.outcome != "commissioned":
             return self.outcome
+        if self.is_unknown:
+            return UNSURE
         if self.written.startswith(RESTORED):
             return RESTORED_SINCE
         return "commissioned" if self.written.startswith("new") else ACCEPTED

@@ -258,7 +258,7 @@ def _file_losses(folder: Path, whole: list[Record]) -> Iterator[Loss]:
         path = folder / Path(str(name)).name
         if not path.is_file():
             yield Loss(str(name), None, "the file is gone")
-        elif (seen := cover(path)) not in (wanted, announced.get(name)):
+        elif (seen := cover(path)) not in (wanted, *announced.get(name, ())):
             size = wanted.get("bytes") if isinstance(wanted, dict) else None
             yield Loss(
                 str(name), None,
@@ -279,7 +279,7 @@ def _seal(folder: Path, whole: list[Record], key: bytes | None) -> tuple[str, li
     last = sealed[-1]
     if not is_sealed_by(key, last.get("previous"), last["record"]):
         return "wrong", [Loss("journal.jsonl", last["n"], "the seal is not of this key, or what it covers was changed")]
-    if last is closed[-1] and not to_come(whole):
+    if last is whole[-1]:
         return "valid", []
     said = f"valid up to record {last['n']}; what was added after it has none"
     return said, list(_changed_since(folder, last))

@@ -13,7 +13,16 @@ from typing import Any
 from typing_extensions import TypedDict
 
 from commissioner.encoding import plain
-from commissioner.errors import Aborted, CheckFailed, CommissionerError, DataRefused, DriveFault, LinkError, UsageError
+from commissioner.errors import (
+    Aborted,
+    CheckFailed,
+    CommissionerError,
+    DataRefused,
+    DriveFault,
+    LinkError,
+    UsageError,
+    WriteBackFailed,
+)
 from commissioner.link.drive.facts import Intent
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.drive.ordinary.tuning import REST, Operator, Tuned
@@ -34,7 +43,7 @@ from commissioner.report.run.summary import summarise
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.report import write_report
 from commissioner.run.commission import Commissioned, Order, Origin
-from commissioner.run.ending import as_error, ended_by, note
+from commissioner.run.ending import as_error, ended_by, note, write_lost
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import names_of, open_drive
@@ -234,10 +243,15 @@ class _Run:
         try:
             self._repeat(inverter)
             self._judge(snapshot)
-            self._leave(inverter, snapshot)
-        except BaseException:
-            self._bring_back(inverter, snapshot)
-            raise
+            is_kept = self._leave(inverter)
+        except BaseException as failure:
+            lost = self._bring_back(inverter, snapshot)
+            if lost is None or not isinstance(failure, CommissionerError | OSError):
+                raise
+            error = failure if isinstance(failure, CommissionerError) else as_error(failure, self._folder)
+            raise _not_given_back(lost, error) from failure
+        if not is_kept and (lost := self._bring_back(inverter, snapshot)) is not None:
+            raise lost
 
     def _check(self, inverter: Inverter) -> ParameterSnapshot:
         """Idle, without a fault, set up for this motor; and what it holds, archived before anything changes it."""
@@ -310,16 +324,15 @@ class _Run:
         self._folder.journal("tunings_judged", self._found.verdict, durable=True)
         self._tell(self._found.verdict)
 
-    def _leave(self, inverter: Inverter, snapshot: ParameterSnapshot) -> None:
-        """The best set, where it was asked for and nothing objects; else what was there before."""
+    def _leave(self, inverter: Inverter) -> bool:
+        """The best set, where it was asked for and nothing objects. False: what was there before is to come back."""
         verdict = self._found.verdict
         assert verdict is not None
         if verdict.objections or not self._wanted.order.write_back:
-            self._bring_back(inverter, snapshot)
-            return
+            return False
         if not self._can_write:
             self._found.in_the_drive = LAST_LEFT
-            return
+            return True
         present = inverter.snapshot()
         report = inverter.keep_tuned(verdict.best, present)
         held = inverter.snapshot().in_use
@@ -328,23 +341,28 @@ class _Run:
         self._folder.journal("parameters_written", report, durable=True)
         kept = "stored" if report.is_stored else "not stored: save at the drive or it is lost at power-off"
         self._found.in_the_drive = f"new: the tuning nearest to the medians, read back, {kept}"
+        return True
 
-    def _bring_back(self, inverter: Inverter, snapshot: ParameterSnapshot) -> None:
-        """The snapshot; where that fails the end of the run says so instead."""
+    def _bring_back(self, inverter: Inverter, snapshot: ParameterSnapshot) -> WriteBackFailed | None:
+        """The snapshot. What kept the drive from taking it, which ends the run: nobody knows then what it holds."""
         if not self._can_write:
             self._found.in_the_drive = LAST_LEFT
-            return
+            return None
+        steps = (*self._wanted.tuning.steps, *self._wanted.tuning.finally_)
+        written = {step.item for step in steps if step.do == "write" and step.item in snapshot.in_use}
         try:
-            report = inverter.restore(snapshot)
-        except CommissionerError as failure:
-            self._found.in_the_drive = f"unknown: {failure.what}"
-            self._found.remarks.append(f"the values found before could not be restored: {failure.what}; run `restore`")
-            note(self._folder, "restore_failed", failure.as_dict())
-            return
-        self._folder.journal("snapshot_restored", report, durable=True)
+            report = inverter.restore(snapshot, again=written)
+        except (CommissionerError, OSError) as failure:
+            lost = write_lost(failure, self._folder) if isinstance(failure, OSError) else _as_lost(failure)
+            self._found.in_the_drive = f"unknown: {lost.what}"
+            self._found.remarks.append(f"the values found before could not be restored: {lost.what}; run `restore`")
+            note(self._folder, "restore_failed", lost.as_dict())
+            return lost
         self._found.in_the_drive = "as before, read back"
+        note(self._folder, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
         if report.fault:
             self._found.remarks.append(f"the drive reports a fault: {report.fault}")
+        return None
 
     def _prove_power_cycle(self, opened: OpenPort, kept: KeptSet) -> None:
         """Off and on again; then the drive must hold what was kept."""
@@ -378,6 +396,26 @@ class _Run:
 
     def _tell(self, record: object) -> None:
         self._present(record)
+
+
+def _as_lost(failure: CommissionerError) -> WriteBackFailed:
+    """Whatever kept a drive from taking its old values back, a refusal before anything was written included."""
+    if isinstance(failure, WriteBackFailed):
+        return failure
+    return WriteBackFailed(
+        f"the snapshot could not be restored: {failure.what}", step="restore", value=failure.value, limit=failure.limit, unit=failure.unit,
+        remedy=f"{failure.remedy}; then run restore",
+    )  # fmt: skip
+
+
+def _not_given_back(lost: WriteBackFailed, error: CommissionerError) -> WriteBackFailed:
+    """What ended a tune, as the fault that it is while the drive does not hold what it held before. A motor that is to be taken as live
+    comes first."""
+    remedies = dict.fromkeys((error.remedy, lost.remedy) if error.outcome == "faulted" else (lost.remedy, error.remedy))
+    return WriteBackFailed(
+        "; ".join(dict.fromkeys((error.what, lost.what))), step=error.step, value=error.value, limit=error.limit, unit=error.unit,
+        remedy="; ".join(remedies),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import datetime as dt
 from dataclasses import dataclass
 
 from commissioner.records import drive_words
-from commissioner.report.run.standing import RESTORED_SINCE
+from commissioner.report.run.standing import RESTORED_SINCE, UNSURE
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.access.visitors import Visitor
 from commissioner.service.library import Drive
@@ -271,6 +271,7 @@ def _ended(run: LiveRun, standing: str, word: str, t: Texts) -> tuple[str, str, 
         done = {
             "commissioned": "Measured and written",
             RESTORED_SINCE: "Measured, written, and the old values restored",
+            UNSURE: "Measured. The drive holds its old or its new parameters",
         }.get(standing, "Measured: every parameter within its acceptance. Not written")
         return "off", f"{t.gettext(done)}. {word}", nothing
     what = {"rejected": "Measured, not good enough", "aborted": "The run was aborted"}.get(outcome, "The run failed")

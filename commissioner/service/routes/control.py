@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Form, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict
-from starlette.requests import HTTPConnection
+from starlette.requests import ClientDisconnect, HTTPConnection
 
 from commissioner.encoding import JsonObject, read_json
 from commissioner.service.access.accounts import Role
@@ -34,6 +34,8 @@ BAND_S, BAND_BESIDE_NUMBERS_S = 0.4, 0.8
 """The band is sent anew so often: its age must not be older than a second, and a page hears of its service by it where no run's numbers
 come."""
 UNKNOWN = "somebody at a page"
+WORDS_S = 0.2
+"""So long a STOP waits for the reason that its request announced; a body of so few bytes comes with its head."""
 
 
 class StopWish(BaseModel):
@@ -46,9 +48,9 @@ _MAY_SAY_WHY = {"requestBody": {"content": {"application/json": {"schema": StopW
 
 
 async def _why(request: Request) -> str:
-    """The reason where the body says one: a STOP is never refused for its words."""
-    with contextlib.suppress(ValueError):
-        said = read_json(await request.body())
+    """The reason where the body says one: a STOP is never refused for its words, nor waits for the rest of them."""
+    with contextlib.suppress(ValueError, ClientDisconnect, TimeoutError):
+        said = read_json(await asyncio.wait_for(request.body(), WORDS_S))
         return str(said.get("reason") or "")[:300] if isinstance(said, dict) else ""
     return ""
 

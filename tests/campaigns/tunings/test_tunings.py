@@ -3,18 +3,23 @@
 The whole campaign: python -m tests.campaigns.tunings.cases --seeds 4
 """
 
+import errno
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from commissioner.errors import CheckFailed, IdentityMismatch
+from commissioner.errors import CheckFailed, IdentityMismatch, WriteBackFailed
+from commissioner.link.drive.facts import Action
+from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.run import restore as restoring
 from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.tuning.tune import TuneOrder, order_of, tune
 from commissioner.settings import load_motor, load_procedure
-from sim.vendors.drive import Habits
+from sim.vendors.drive import Habits, VendorDrive
+from sim.vendors.face import read_face
 from tests.campaigns.tunings import bench
 from tests.campaigns.tunings.cases import applies, campaign, cases, judge, names
 from tests.support.service.described import judge as described
@@ -45,6 +50,71 @@ def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monke
         monkeypatch.setattr(restoring, "open_port", lambda *_, d=tried.drive, c=clock, **__: bench.VendorPort(d, c))
         restoring.restore(find_run(tmp_path / Path(name).stem, "last"), None)
         assert tried.drive.truth()["held"] == tried.before, name
+
+
+LONGER_THAN_ANY_SETTLES_S = 20.0
+WRITABLE = [name for name in names() if {"restore"} <= set(load_profile(name).capabilities)]
+
+
+@pytest.mark.parametrize("write_back", [True, False])
+@pytest.mark.parametrize(
+    "habits", [Habits(late_s=LONGER_THAN_ANY_SETTLES_S), *(Habits(refuses_from=n) for n in (1, 2, 3, 6))]
+)
+def test_a_tune_whose_drive_does_not_show_or_take_what_is_written_never_says_what_is_not_so(
+    habits, write_back, tmp_path, monkeypatch
+):
+    for name in WRITABLE:
+        folder = tmp_path / Path(name).stem
+        tried = bench.try_tune(name, folder, habits=habits, write_back=write_back, power_cycle=False)
+        drive, ended = tried.drive, tried.done.ended
+        tried.person.clock.sleep(LONGER_THAN_ANY_SETTLES_S)
+        said = tried.done.result["tune"]["in_the_drive"]
+        if said.startswith("as before"):
+            assert drive.truth()["held"] == tried.before, name
+        if said.startswith("unknown"):
+            assert ended.outcome == "faulted" and "restore" in ended.error["remedy"], name
+        if ended.outcome == "commissioned":
+            assert said.startswith("new" if write_back else "as before"), name
+        summary = find_run(folder, "last")
+        assert summary.is_unknown == said.startswith("unknown"), name
+        drive.habits = Habits()
+        monkeypatch.setattr(
+            restoring, "open_port", lambda *_, d=drive, c=tried.person.clock, **__: bench.VendorPort(d, c)
+        )
+        restoring.restore(summary, None)
+        assert drive.truth()["held"] == tried.before, name
+
+
+@pytest.mark.parametrize("name", [name for name in WRITABLE if "write_back" in load_profile(name).capabilities])
+def test_a_write_back_is_taken_back_from_a_drive_that_shows_it_late(name):
+    """Reading alone said that nothing was to be taken back: the old values stood there still, and a second later the new ones."""
+    clock = bench.JumpingClock()
+    drive = VendorDrive(read_face(name), clock.now, habits=Habits(late_s=LONGER_THAN_ANY_SETTLES_S))
+    before = drive.truth()["held"]
+    inverter = Inverter(
+        bench.VendorPort(drive, clock), load_profile(name), lambda _: None, sleep=clock.sleep, clock=clock.now
+    )
+    snapshot = inverter.snapshot()
+    with pytest.raises(WriteBackFailed, match="verified") as failed:
+        inverter.write_parameters({"stator_resistance": 0.9 * snapshot.in_use["stator_resistance"]}, snapshot)
+    assert failed.value.was_restored
+    clock.sleep(LONGER_THAN_ANY_SETTLES_S)
+    assert drive.truth()["held"] == before
+
+
+def test_a_disk_that_fills_up_while_a_tune_brings_the_old_values_back_is_not_told_as_done(tmp_path, monkeypatch):
+    journal = RunFolder.journal
+
+    def filling(folder, kind, record, *, durable=False):
+        if kind == "about_to" and record.action is Action.COMMIT:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        journal(folder, kind, record, durable=durable)
+
+    monkeypatch.setattr(RunFolder, "journal", filling)
+    tried = bench.try_tune("yaskawa_a1000", tmp_path, write_back=False)
+    assert tried.truth["held"] != tried.before
+    assert tried.done.result["tune"]["in_the_drive"].startswith("unknown: the run's archive cannot be written")
+    assert tried.done.ended.outcome == "faulted" and "restore" in tried.done.ended.error["remedy"]
 
 
 @pytest.mark.parametrize("how", ["good", "fails"])

@@ -15,8 +15,10 @@ from commissioner.operations.history.compare import compare_runs
 from commissioner.operations.history.motors import judge_motor, list_motors, name_motor, runs_of
 from commissioner.operations.history.runs import Archive, Wanted, find_runs
 from commissioner.operations.history.trend import trend, trend_of_indicators
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.verify import verify
 from commissioner.run.index.years import over_years
+from tests.support.archive.killed import die
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 from tests.unit.cli.test_failures import leave
 
@@ -80,6 +82,14 @@ def test_a_run_that_goes_on_or_a_motor_without_name_is_refused(tmp_path):
         name_motor(Archive(tmp_path), "last", tag=" ")
     with pytest.raises(UsageError, match="no run was made"):
         trend(Archive(tmp_path), "A")
+
+
+def test_a_run_whose_restore_was_killed_can_still_be_named(tmp_path):
+    folder = make_run(tmp_path, "20260101-000000-x-abcdef")
+    killed = RunFolder(folder)
+    killed.journal("about_to", {"action": "stage", "values": {}}, durable=True)
+    die(killed)
+    assert name_motor(Archive(tmp_path), "last", tag="A").motor_tag == "A"
 
 
 def test_an_unchanged_motor_has_no_trend_whatever_its_temperature_and_flux(tmp_path):

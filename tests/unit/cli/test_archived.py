@@ -7,12 +7,21 @@ import pytest
 
 from commissioner.cli.screens import screen
 from commissioner.cli.verbs.archived import runs, verify
+from commissioner.errors import DataRefused
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
+from commissioner.run import write_accepted
+from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.replay import apart
+from commissioner.run.archive.summary import STANDINGS
 from commissioner.text import counted, did_you_mean
+from tests.support.archive.killed import die
+from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
 @pytest.mark.parametrize(
-    "standing", ["commissioned", "accepted, not written", "commissioned, restored since", "faulted"]
+    "standing",
+    ["commissioned", "accepted, not written", "commissioned, restored since", "commissioned, old or new", "faulted"],
 )
 def test_no_word_of_a_list_of_runs_is_broken_at_80_columns(monkeypatch, standing):
     row = SimpleNamespace(
@@ -65,3 +74,27 @@ def test_a_decision_that_comes_out_otherwise_is_told_at_the_place_that_differs()
     assert apart({"x": [1]}, {"x": [1, 2]}) == ("x.1", None, 2)
     assert apart("c", "b") == ("", "c", "b")
     assert apart({"x": 1}, {}) == ("x", 1, None)
+
+
+@pytest.mark.parametrize("last", ["about_to", "parameters_written", "snapshot_restored"])
+def test_what_a_run_is_shown_as_follows_what_was_written_since(tmp_path, last):
+    """A write-back that was killed stood there as `commissioned`, and beside it that the drive still holds its old values."""
+    name = "20260101-000000-simulated-abcdef"
+    folder = make_run(tmp_path, name, result=result_of(name, MACHINE))
+    assert find_run(tmp_path, "last").standing == ACCEPTED
+    writing = RunFolder(folder)
+    writing.journal("about_to", {"action": "commit", "values": {}}, durable=True)
+    if last != "about_to":
+        writing.journal(last, {"is_stored": True}, durable=True)
+    die(writing)
+    run = find_run(tmp_path, "last")
+    wanted = {"about_to": UNSURE, "parameters_written": "commissioned", "snapshot_restored": RESTORED_SINCE}
+    assert run.standing == wanted[last] and wanted[last] in STANDINGS
+    with screen.out.capture() as shown:
+        runs.show_run(tmp_path, "last", as_json=False)
+    assert "still holds its old values" not in shown.get()
+    assert ("old or new" in shown.get()) == (last == "about_to")
+    if last == "about_to":
+        with pytest.raises(DataRefused, match="did not end") as refused:
+            write_accepted._circuit(run)
+        assert f"commissioner restore {name}" in refused.value.remedy

@@ -5,6 +5,7 @@ import os
 import re
 import sqlite3
 import stat
+import threading
 from contextlib import closing, nullcontext
 from types import SimpleNamespace
 
@@ -31,6 +32,7 @@ from commissioner.run.archive.summary import summarise
 from commissioner.run.archive.verify import verify
 from commissioner.service.archive import Archive
 from commissioner.service.runs.others import request_of
+from tests.support.archive.killed import die
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
@@ -336,6 +338,60 @@ def test_a_session_killed_while_it_replaced_a_covered_file_leaves_the_run_intact
     RunFolder(first.path, key).close()
     assert (verify(first.path, key).losses, verify(first.path, key).seal) == ((), "valid")
     assert not any(name in remark for remark in verify(first.path).remarks)
+
+
+def test_of_sessions_killed_one_behind_the_other_each_may_have_put_its_file_in_place(tmp_path):
+    with closing(RunFolder.create(tmp_path, "killed_twice")) as first:
+        first.journal("run_ended", {"outcome": "commissioned"})
+        first.save_text("report.html", "as the run ended")
+    for text in ("by the first", "by the second"):
+        killed = RunFolder(first.path)
+        killed.save_text("report.html", text)
+        die(killed)
+        assert verify(first.path).losses == ()
+    for text in ("as the run ended", "by the first"):
+        (first.path / "report.html").write_text(text)
+        assert verify(first.path).losses == ()
+    (first.path / "report.html").write_text("by nobody")
+    assert [loss.file for loss in verify(first.path).losses] == ["report.html"]
+
+
+def test_what_is_added_behind_the_seal_without_the_key_is_not_told_as_sealed(tmp_path):
+    key = b"a key of thirty-two bytes or so."
+    with closing(RunFolder.create(tmp_path, "sealed", key)) as sealed:
+        sealed.journal("run_ended", {"outcome": "commissioned"})
+    assert verify(sealed.path, key).seal == "valid"
+    stranger = RunFolder(sealed.path)
+    stranger.journal("parameters_written", {"is_stored": True})
+    die(stranger)
+    assert verify(sealed.path, key).seal == "valid up to record 2; what was added after it has none"
+
+
+def test_two_who_write_into_one_run_take_turns_and_its_chain_stays_whole(tmp_path, monkeypatch):
+    with closing(RunFolder.create(tmp_path, "two")) as first:
+        first.journal("run_ended", {"outcome": "commissioned"})
+    diagnosing, waited = RunFolder(first.path), []
+
+    def restoring():
+        with closing(RunFolder(first.path)) as second:
+            second.journal("snapshot_restored", {})
+
+    other = threading.Thread(target=restoring)
+    other.start()
+    diagnosing.journal("diagnosed", {}, durable=True)
+    waited.append(other.is_alive())
+    diagnosing.close()
+    other.join(20)
+    assert waited == [True] and verify(first.path).losses == ()
+    assert [line["kind"] for line in read_journal(first.path / "journal.jsonl")][-3:] == [
+        "folder_closed",
+        "snapshot_restored",
+        "folder_closed",
+    ]
+    assert not (first.path / ".lock.part").exists()
+    monkeypatch.setattr("commissioner.run.archive.folder.LOCK_S", 0.0)
+    with closing(RunFolder(first.path)), pytest.raises(UsageError, match="another process writes into"):
+        RunFolder(first.path)
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

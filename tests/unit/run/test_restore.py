@@ -20,6 +20,7 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.summary import summarise
 from commissioner.settings import load_motor
 from tests.support.archive.chained import rechain
+from tests.support.archive.killed import die
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")
@@ -49,6 +50,8 @@ class Bench:
         return self.inverter.write_parameters(values, self.inverter.snapshot())
 
     def restore(self):
+        """Once the run's process is gone."""
+        die(self.folder)
         return restoring.restore(summarise(self.folder.path), None)
 
     def held(self):

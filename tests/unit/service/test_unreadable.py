@@ -16,11 +16,13 @@ from starlette.testclient import TestClient
 
 from commissioner.errors import DataRefused
 from commissioner.operations.export import export_model
+from commissioner.run.archive.folder import RunFolder
 from commissioner.service.access.gate import CSP
 from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings
 from commissioner.service.parts import make_parts
 from commissioner.service.problems import Refusal, install
+from tests.support.archive.killed import die
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
@@ -63,6 +65,23 @@ def test_a_result_that_somebody_changed_ends_no_list_and_no_page(tmp_path: Path,
     assert [run["run"] for run in client.get("/api/runs").json()["runs"]] == [bad, good]
     shown = client.get(f"/runs/{bad}", headers=page)
     assert shown.status_code == 200 or (shown.status_code == 422 and "is damaged" in shown.text)
+
+
+def test_a_run_whose_write_back_was_killed_is_not_told_as_written(tmp_path: Path) -> None:
+    run = "20240105-081500-simulated-000abc"
+    writing = RunFolder(make_run(tmp_path / "runs", run, result=result_of(run, MACHINE)))
+    writing.journal("about_to", {"action": "commit", "values": {}}, durable=True)
+    die(writing)
+    (writing.path / "snapshot.json").write_text("{}", "utf-8")
+    app = create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data")))
+    client = TestClient(app, base_url="http://127.0.0.1", headers={"accept": "text/html"})
+    said = client.get(f"/runs/{run}").text
+    assert "Measured and written" not in said and f"/runs/{run}/write-back" not in said
+    assert (
+        "The drive holds its old or its new parameters: restore the old ones." in said
+        and f"/runs/{run}/restore" in said
+    )
+    assert "commissioned, old or new" in client.get("/runs").text
 
 
 def test_a_damaged_journal_ends_every_export_as_on_the_command_line(tmp_path: Path) -> None:

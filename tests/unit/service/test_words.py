@@ -14,7 +14,7 @@ from commissioner.link.files.drive_file import known_drives, load_profile
 from commissioner.procedure.checks import check_name
 from commissioner.procedure.states import ENDED, State
 from commissioner.procedure.tuned import FEWEST
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
 from commissioner.report.sheet.words import NBSP
 from commissioner.run.archive import summary
 from commissioner.service.page.frame import environment, words_of
@@ -63,7 +63,7 @@ def test_what_the_core_remarks_of_every_run_has_its_german():
     remarks = (
         LongerTest(8.0, (0.002,) * 4, (0.001,) * 4).sentence, LongerTest(8.0, (0.002,) * 4, (0.002,) * 4).sentence,
         TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
-        RESTORED_SINCE, ACCEPTED, "as before, read back", "no load current", "not identified",
+        RESTORED_SINCE, ACCEPTED, UNSURE, "as before, read back", "no load current", "not identified",
         "Schneider Altivar ATV320, serial number not known",
         "orientations: 2; sensor gain and anisotropy need at least three: what the phases or their sensors differ by is in the values, and "
         "not all of it in the intervals",
