@@ -48,6 +48,8 @@ MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
+RENEWALS, RENEWED_TO = (1, 2), 0.02
+"""Rows a carrier period where each has its own voltage, which an inverter renews once or twice a period; how near to that."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
 """Shortest window; fewest samples a period of the supply."""
 MONITORED_S, MONITORED_RATE = 2.0, 10.0
@@ -84,7 +86,8 @@ class Window:
 
 @dataclass(frozen=True)
 class Record:
-    """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
+    """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `is_renewed`: a row for each voltage that
+    the inverter makes; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
     of the electrical speed before smoothing."""
 
     windows: tuple[Window, ...]
@@ -94,6 +97,7 @@ class Record:
     has_speed: bool
     has_zero: bool
     is_commanded: bool
+    is_renewed: bool
     sigma_a: tuple[float, float, float]
     sigma_v: float
     sigma_w: float = 0.0
@@ -213,13 +217,18 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     remarks += _of_third_current(computed, has_zero)
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
-    commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
+    carrier = float(recordings[0].metadata.get("switching_frequency_hz") or 0.0)
     return Record(
-        tuple(windows), period, scales, plate, has_speed, has_zero, commanded, (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
+        tuple(windows), period, scales, plate, has_speed, has_zero, carrier > 0.0, _is_renewed(carrier, period), (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _is_renewed(carrier_hz: float, period_s: float) -> bool:
+    """Whether rows and what an inverter renews its voltage by go together."""
+    return carrier_hz > 0.0 and any(abs(1.0 / (carrier_hz * period_s) / k - 1.0) < RENEWED_TO for k in RENEWALS)
 
 
 def _of_third_current(computed: Sequence[str], has_zero: bool) -> Iterator[str]:
