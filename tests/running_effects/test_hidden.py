@@ -9,6 +9,7 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Column, Fit, Machine, Problem
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.running import identification
 from commissioner.running.identification import identify
 from tests.running_effects.cases import Case, taken
@@ -43,6 +44,26 @@ def test_iron_and_bars_that_one_start_tells_are_both_in_the_fit() -> None:
     r_r = found.parameters["rotor_resistance_ohm"]
     assert abs(r_r.value - FOUR["rotor_resistance"]) < 3.0 * r_r.std
     assert any("an iron loss and current displacement in the bars" in r for r in found.remarks)
+
+
+@pytest.mark.parametrize("corner", [50.0, 600.0])
+def test_bars_of_another_corner_are_in_the_fit(corner: float) -> None:
+    """Held at 138 rad/s their corner left L_sigma 7 to 50 % off, up to five stated errors, and R_s 9 to 45 %."""
+    found = identify([started(PLATE, bar_resistance=1.0, bar_corner=corner)], PLATE)
+    for name, own in zip(("leakage_inductance_h", "stator_resistance_ohm"), ("leakage_inductance", "stator_resistance"), strict=True):  # fmt: skip
+        quantity = found.parameters[name]
+        assert abs(quantity.value - FOUR[own]) < 3.0 * quantity.std
+        assert quantity.value == pytest.approx(FOUR[own], rel=0.02)
+    assert any("current displacement in the bars" in r for r in found.remarks)
+
+
+def test_currents_that_are_late_leave_the_four_where_they_are() -> None:
+    """A quarter of a period between the channels: a cable of filters, or a scan of one channel after the other."""
+    found = identify([started(PLATE, delay=5e-5)], PLATE)
+    for name, own in zip(PARAMETERS, FOUR, strict=True):
+        quantity = found.parameters[name]
+        assert abs(quantity.value - FOUR[own]) < 3.0 * quantity.std
+    assert any("a time between currents and voltages" in r for r in found.remarks)
 
 
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
