@@ -52,6 +52,8 @@ RENEWALS, RENEWED_TO = (1, 2), 0.02
 """Rows a carrier period where each has its own voltage, which an inverter renews once or twice a period; how near to that."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
 """Shortest window; fewest samples a period of the supply."""
+LEAST_SAMPLES = 50
+"""Of a file: fewer tell neither noise nor the supply's turning."""
 MONITORED_S, MONITORED_RATE = 2.0, 10.0
 """Shortest steady stretch and fewest samples a period that `monitor` reads: it asks for less than a fit of the current's own course."""
 FAST_HZ = 5000.0
@@ -292,6 +294,11 @@ def _vector(x: Array) -> Array:
 
 def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
+    if one.time_s.size < LEAST_SAMPLES:
+        raise _refused(
+            f"{one.source}: {one.time_s.size} samples are no recording", one.time_s.size, f"{LEAST_SAMPLES} samples, and {LEAST_S} s of a motor that is fed",
+            "record a start, load steps, or a second of steady running",
+        )  # fmt: skip
     if per_period < LEAST_RATE:
         least = LEAST_RATE * scales.frequency_rad_per_s / (2 * np.pi)
         raise _refused(

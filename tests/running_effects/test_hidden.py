@@ -66,6 +66,32 @@ def test_currents_that_are_late_leave_the_four_where_they_are() -> None:
     assert any("a time between currents and voltages" in r for r in found.remarks)
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_unlike_voltage_gains_are_in_the_errors_under_one_load(seed: int) -> None:
+    """A channel of class 0.2 drew R_s 23 to 50 % aside in three motors, and nothing was left to tell it by."""
+    recording, plate, truth = taken(Case(seed, "null", "steady").scenario(), seed)
+    u, v, w = recording.voltages_v
+    found = identify([replace(recording, voltages_v=(1.002 * u, v, w))], plate)
+    for name, value in truth["inverse_gamma"].items():
+        own = found.parameters[name]
+        assert abs(own.value - value) < 3.0 * own.std, (name, own, value)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 49, 51, 120])
+def test_a_file_of_a_few_rows_is_refused_with_its_remedy(count: int) -> None:
+    """Two rows ended in an error of the smoothing, as a defect."""
+    whole = started(PLATE)
+    i, v = ([x[:count] for x in group] for group in (whole.currents_a, whole.voltages_v))
+    assert whole.speed_rad_per_s is not None
+    short = replace(
+        whole, time_s=whole.time_s[:count], currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2]),
+        speed_rad_per_s=whole.speed_rad_per_s[:count],
+    )  # fmt: skip
+    with pytest.raises(DataRefused, match=r"no recording|long enough") as refused:
+        identify([short], PLATE)
+    assert refused.value.remedy
+
+
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only `diagnose` asked whether the plate's motor may be so."""
     recording, plate, _ = taken(Case(4, "null", "steady").scenario(), 4)
