@@ -60,6 +60,8 @@ FAST_HZ = 5000.0
 """Rate that shows a start's first milliseconds at the supplies of 50 and 60 Hz."""
 MOST_SAMPLES = 60_000
 """Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
+MOST_OVER_FIELD = 1.5
+"""Speed of a shaft over that of its field, beyond which it is in another unit: a load that drives takes a motor some per cent over, breakdown a fifth."""
 NOISY_VOLTAGE = 0.15
 """Sample-to-sample noise over rated peak beyond which a voltage is pulses, not a waveform."""
 
@@ -307,12 +309,32 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{least:.0f} samples a second",
             f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
+    _check_speed(one, voltage, scales)
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:
         raise _refused(
             f"{one.source}: the voltages are pulses of an inverter, not their means", sigma, NOISY_VOLTAGE * scales.voltage_v,
             "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages"
             f"{_for_monitor(one, per_period)}",
+        )  # fmt: skip
+
+
+def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
+    """Refused where the shaft is told to turn much faster than the field of the voltage: another unit."""
+    if one.speed_rad_per_s is None:
+        return
+    block = max(round(BLOCK_S / one.sample_period_s), 2)
+    whole = one.time_s.size // block * block
+    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
+    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
+    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[:whole].reshape(-1, block)).mean(axis=1)
+    is_fed = (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & np.isfinite(speed) & (turn > 0.0)
+    ratio = float(np.median(speed[is_fed] / turn[is_fed])) if is_fed.any() else 0.0
+    if ratio > MOST_OVER_FIELD:
+        raise _refused(
+            f"{one.source}: the shaft would turn {ratio:.3g} times as fast as the field that the voltage makes", ratio, MOST_OVER_FIELD,
+            "the column is the shaft's speed in rad/s (9.55 times too much: it is in rev/min, which the column speed_rpm takes; as many times as "
+            "the poles have pairs: it is the electrical one)",
         )  # fmt: skip
 
 

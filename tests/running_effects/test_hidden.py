@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
@@ -90,6 +91,16 @@ def test_a_file_of_a_few_rows_is_refused_with_its_remedy(count: int) -> None:
     with pytest.raises(DataRefused, match=r"no recording|long enough") as refused:
         identify([short], PLATE)
     assert refused.value.remedy
+
+
+@pytest.mark.parametrize("factor", [60.0 / (2.0 * np.pi), 2.0])
+def test_a_speed_in_another_unit_is_named(factor: float) -> None:
+    """Rev/min or the electrical speed under the name of rad/s: the refusal had spoken of a magnetizing inductance of 1e-09 H."""
+    whole = started(PLATE)
+    assert whole.speed_rad_per_s is not None
+    with pytest.raises(DataRefused, match="as fast as the field") as refused:
+        identify([replace(whole, speed_rad_per_s=factor * whole.speed_rad_per_s)], PLATE)
+    assert "speed_rpm" in refused.value.remedy
 
 
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:
