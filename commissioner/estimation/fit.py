@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
-from commissioner.estimation.kernels.march import STATES, UNSET, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
@@ -69,12 +69,13 @@ class Machine:
     beside: Array
     has_shaft: bool = False
 
-    def places(self, window: int, count: int, period_s: float) -> Array:
-        """Where the samples and what lies between them fall among the window's knots."""
+    def load(self, window: int, count: int, period_s: float) -> Load:
+        """The window's knots, and where its samples and what lies between them fall among them."""
         if not self.has_shaft:
-            return np.zeros(2 * count - 1)
+            return Load(self.knots[window], np.zeros(2 * count - 1))
         times = self.knot_times_s[window]
-        return np.asarray(np.interp(0.5 * period_s * np.arange(2 * count - 1), times, np.arange(times.size)))
+        places = np.interp(0.5 * period_s * np.arange(2 * count - 1), times, np.arange(times.size))
+        return Load(self.knots[window], np.asarray(places))
 
     def physical(self, window: int = 0) -> Array:
         """As the kernel takes them for a window."""
@@ -220,8 +221,7 @@ def simulate(problem: Problem, machine: Machine) -> list[tuple[Array, Array]]:
             x,
             w.voltage,
             w.speed,
-            machine.knots[k],
-            machine.places(k, w.count, problem.period),
+            machine.load(k, w.count, problem.period),
             problem.period,
             machine.has_shaft,
             run,
@@ -288,8 +288,8 @@ def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence
             dx[row, column.index] = 1.0
     run = np.empty((len(columns), u, 3))
     tangents(
-        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], dp, dx, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
-        machine.knots[k], machine.places(k, u, problem.period), problem.period, machine.has_shaft, run,
+        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], Directions(dp, dx), w.voltage[: 2 * u - 1],
+        w.speed[: 2 * u - 1], machine.load(k, u, problem.period), problem.period, machine.has_shaft, run,
     )  # fmt: skip
     return run
 
@@ -300,7 +300,7 @@ def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Arra
     run = np.empty((count, u, 3))
     load_tangents(
         machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
-        machine.knots[k], machine.places(k, u, problem.period), problem.period, run,
+        machine.load(k, u, problem.period), problem.period, run,
     )  # fmt: skip
     return run
 

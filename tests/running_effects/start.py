@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.estimation.kernels.march import STATES, march
+from commissioner.estimation.kernels.march import STATES, Load, march
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS
 from commissioner.estimation.record import scales_of
 from commissioner.motor.nameplate import Nameplate
@@ -48,7 +48,7 @@ def started(
     out, shaft = np.empty((COUNT_SAMPLES, 3)), np.empty((COUNT_SAMPLES, 2))
     march(
         p, scales_of(plate).as_tuple(), np.zeros(STATES), np.stack([u.real, u.imag], axis=1), np.stack([w, np.gradient(w, t)], axis=1),
-        np.array([active, active + later]), (t > 1.19).astype(float), PERIOD, has_shaft, out, shaft,
+        Load(np.array([active, active + later]), (t > 1.19).astype(float)), PERIOD, has_shaft, out, shaft,
     )  # fmt: skip
     w = np.repeat(shaft[:, 0], 2)[:-1] if has_shaft else w
     i, axes = out[:, 0] + 1j * out[:, 1], np.exp(-2j * np.pi * np.arange(3) / 3)

@@ -8,7 +8,10 @@ DOI 10.1137/S003614459631241X) are exact to the last digit, from the same lines.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.compiled import forget_stale_kernels, njit
 from commissioner.estimation.numbers import AT
@@ -66,6 +69,20 @@ GAP_STEPS = 4
 """Of Newton's method for the flux of the air gap: the saturated current through the leakage moves it by some per cent only."""
 
 
+class Load(NamedTuple):
+    """Load torque, of rated torque, between `knots` (m,), at `places` (2n - 1,) among them: at samples and between them."""
+
+    knots: NDArray[Any]
+    places: NDArray[np.float64]
+
+
+class Directions(NamedTuple):
+    """Along which derivatives are taken: of the parameters (C, ...) and of the first state (C, STATES)."""
+
+    dp: NDArray[np.float64]
+    dx: NDArray[np.float64]
+
+
 @_inlined
 def _gap_current(p, both, z0):
     """Extra magnetizing current over psi_0 / L_M, of the flux of the air gap; `z0`: square of psi_0 over rated flux; `both`: k (1 - k).
@@ -100,14 +117,15 @@ def _reactance(g, b, least):
 
 
 @_kernel
-def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, shaft):
+def march(p, scales, x, voltage, speed, load_torque, period, is_free, out, shaft):
     """Stator current (n, 3: alpha, beta, zero as the sensors show it) into `out`, speed and torque into `shaft` (n, 2).
 
     `voltage` (2n - 1, 2) and `speed` (2n - 1, 2: electrical speed, its derivative) at samples and between them; with
-    `is_free` the speed follows from the shaft and a load torque between `knots` (of rated torque), at `places` (2n - 1) among them.
+    `is_free` the speed follows from the shaft and the `load_torque`.
     Where `scales` says that the voltage is held, each step has what stands midway to its end.
     `x` is the state at the first sample and is overwritten. Types follow `p`.
     """
+    knots, places = load_torque.knots, load_torque.places
     current, volt, w_n, torque_n, pairs, holds = scales
     flux2 = 1.0 / (volt / w_n) ** 2
     n = out.shape[0]
@@ -322,21 +340,20 @@ def _chain(p, current, period, out):
 
 
 @_kernel
-def tangents(p, scales, x0, dp, dx, voltage, speed, knots, places, period, is_free, out):
-    """Derivatives along directions (C, ...) of parameters and first state; `out` (C, n, 3)."""
+def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free, out):
+    """Derivatives `along` directions; `out` (C, n, 3)."""
     step = 1e-30
     n = out.shape[1]
     run, shaft = np.empty((n, 3), dtype=np.complex128), np.empty((n, 2), dtype=np.complex128)
-    level = knots + 0j
+    level = Load(load_torque.knots + 0j, load_torque.places)
     for c in range(out.shape[0]):
         march(
-            p + 1j * step * dp[c],
+            p + 1j * step * along.dp[c],
             scales,
-            x0 + 1j * step * dx[c],
+            x0 + 1j * step * along.dx[c],
             voltage,
             speed,
             level,
-            places,
             period,
             is_free,
             run,
@@ -348,11 +365,12 @@ def tangents(p, scales, x0, dp, dx, voltage, speed, knots, places, period, is_fr
 
 
 @_kernel
-def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
+def load_tangents(p, scales, x0, voltage, speed, load_torque, period, out):
     """Derivatives along every knot of the load, `out` (knots, n, 3): what a march along each gives, for a fifth of its price where there
     are many. A load moves the shaft alone, so that its response is that of one linear machine whose numbers change from sample to
     sample: those are computed once, by a step from each state and from the load's three values within it.
     """
+    knots, places = load_torque.knots, load_torque.places
     step = 1e-30
     n, many = out.shape[1], out.shape[0]
     bare = p + 0j
@@ -366,7 +384,8 @@ def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
     state, x = x0.copy(), np.empty(STATES, dtype=np.complex128)
     to_state, to_current, by_load = np.zeros((STATES, STATES)), np.zeros((2, STATES)), np.zeros((STATES, 3))
     run, shaft = np.empty((2, 3), dtype=np.complex128), np.empty((2, 2), dtype=np.complex128)
-    loads, among = np.empty(3, dtype=np.complex128), np.array([0.0, 1.0, 2.0])
+    loads = np.empty(3, dtype=np.complex128)
+    within = Load(loads, np.array([0.0, 1.0, 2.0]))
     low, part = np.zeros(3, dtype=np.int64), np.empty(3)
     is_still = np.zeros(STATES, dtype=np.bool_)
     is_still[4:6], is_still[6:8] = p[BAR] == 0.0, p[HEAT_S] == 0.0 and p[HEAT_R] == 0.0
@@ -388,7 +407,7 @@ def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
                 x[j] += 1j * step
             else:
                 loads[j - STATES] += 1j * step
-            march(bare, scales, x, voltages, speeds, loads, among, period, True, run[:rows], shaft[:rows])
+            march(bare, scales, x, voltages, speeds, within, period, True, run[:rows], shaft[:rows])
             if j < STATES:
                 to_current[0, j], to_current[1, j] = run[0, 0].imag / step, run[0, 1].imag / step
                 for i in range(STATES):

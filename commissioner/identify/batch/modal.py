@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.compiled import njit
+from commissioner.identify.batch.output_error import Asked
 
 Array = NDArray[np.float64]
 MODAL = 7
@@ -72,20 +73,15 @@ def modal_pass(
     mode: Array,
     flux_per_a: Array,
     offset: float,
-    wanted: Array,
-    information: Array,
-    score: Array,
-    block: int,
-    block_scores: Array,
-    residual: Array,
-    flux: Array,
+    asked: Asked,
 ) -> float:
-    """Residuals y - i - offset into `residual`, stator flux into `flux`; J^T W J (both triangles) and J^T W e added to
-    `information` and `score`, J^T W e by stretches of `block` samples to `block_scores`; sum W e^2 is returned.
+    """Residuals y - i - offset, the stator's flux and the normal equations (both triangles) as `asked`; sum W e^2 is returned.
 
     `mode` and the order of columns as `modes`; `root_weight` (n,) is sqrt(W), or (0,) where all are 1. Columns whose
-    `wanted` is 0 are left out.
+    `wanted` is 0 are left out; no rows are kept.
     """
+    wanted, information, score, block = asked.wanted, asked.information, asked.score, asked.block
+    block_scores, residual, flux = asked.block_scores, asked.residual, asked.flux
     p1, p2, g1, g2, c1, c2 = mode[0], mode[1], mode[2], mode[3], mode[4], mode[5]
     f1, f2 = flux_per_a[0], flux_per_a[1]
     u1, u2, d1, d2, q1, q2 = 0.0, 0.0, 0.0, 0.0, 1.0, 1.0

@@ -17,6 +17,8 @@ F_1..F_k, then the segment's own: offset, psi_s(0), psi_R(0).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,6 +41,71 @@ ROWS = 256
 """Weighted sensitivities gathered before they are multiplied."""
 
 
+class Measured(NamedTuple):
+    """One segment (n,): voltage as commanded, V, and before its first sample; current, A; weight, 0 for samples that were lost; the
+    periods that are done in parts, for the current passes zero in them."""
+
+    u: Array
+    u_before: float
+    y: Array
+    weight: Array
+    passes_zero: NDArray[np.bool_]
+
+
+class Held(NamedTuple):
+    """Of the linear circuit over a period and over a part of one, first axis: held-input response `ad` (2, 2, 2), `b1` (2, 2), ramp response
+    `b2` (2, 2), response `b_r` (2, 2) to a voltage held on the rotor; their derivatives (2, 4, 2, 2) and (2, 4, 2) by the circuit's four."""
+
+    ad: Array
+    b1: Array
+    b2: Array
+    b_r: Array
+    dad: Array
+    db1: Array
+    db2: Array
+    db_r: Array
+
+
+class Machine(NamedTuple):
+    """The shared parameters (p,), and of the magnetizing current beyond the linear one the odd and rising exponents (m,) and the flux, Wb, of
+    which powers are taken."""
+
+    theta: Array
+    exponents: Exponents
+    flux_scale: float
+
+
+class Loss(NamedTuple):
+    """The inverter's voltage error F (rows,), V, over current, its integral in rows, and rows per ampere."""
+
+    table: Array
+    integral: Array
+    per_a: float
+
+
+class Shapes(NamedTuple):
+    """What F is made of: (rows, k) tables of a unit of each coefficient over current 0 ... `current_span`, A, and their integrals in rows."""
+
+    basis: Array
+    integral: Array
+    current_span: float
+
+
+class Asked(NamedTuple):
+    """What is asked for, and where it goes: `wanted` (p,) is 1 where a sensitivity is to be carried; J^T W J and J^T W e are added to
+    `information` (p, p) and `score` (p,), the latter also by stretches of `block` samples to `block_scores`; `residual`, `flux` of the iron (n,); `rows`
+    for the weighted sensitivities: those of every sample where it has (n, p), else of a stretch."""
+
+    wanted: Array
+    information: Array
+    score: Array
+    block: int
+    block_scores: Array
+    residual: Array
+    flux: Array
+    rows: Array
+
+
 @njit()
 def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     """(cell, fraction inside it, rows beyond the table) of the size of a current."""
@@ -51,9 +118,7 @@ def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
 
 @njit(inline="always")
 def _mean_loss(
-    table: Array,
-    integral: Array,
-    per_a: float,
+    loss: Loss,
     i0: float,
     i1: float,
     at0: tuple[int, float, float],
@@ -64,6 +129,7 @@ def _mean_loss(
     F is odd and constant beyond the table. Within a cell it is straight; further apart areas are counted from the cells' edges,
     since a difference of integrals from zero would lose the digits that the implicit step is solved for.
     """
+    table, integral, per_a = loss.table, loss.integral, loss.per_a
     (cell0, in0, out0), (cell1, in1, out1) = at0, at1
     rise0, rise1 = table[cell0 + 1] - table[cell0], table[cell1 + 1] - table[cell1]
     f0, f1 = table[cell0] + in0 * rise0, table[cell1] + in1 * rise1
@@ -86,8 +152,9 @@ def _mean_loss(
 
 
 @njit()
-def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
+def _extra(machine: Machine, flux: float, power: Array) -> tuple[float, float]:
     """(g, g') at the iron's flux; the odd powers of the relative flux into `power`."""
+    theta, exponents, flux_scale = machine.theta, machine.exponents, machine.flux_scale
     relative = flux / flux_scale
     even, reached, g, slope = 1.0, 1, 0.0, 0.0
     for m in range(exponents.size):
@@ -114,32 +181,27 @@ def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
 
 @njit(inline="always")
 def _current_at_end(
-    theta: Array,
-    exponents: Exponents,
-    flux_scale: float,
-    table: Array,
-    integral: Array,
-    per_a: float,
-    free: float,
-    c1: float,
-    beta: float,
-    b1: float,
-    on_stator: float,
+    machine: Machine,
+    loss: Loss,
+    free: tuple[float, float],
+    by_loss: tuple[float, float],
     i0: float,
     guess: float,
     within: float,
     power: Array,
 ) -> tuple[float, float, float, float, float, float]:
     """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + on_stator g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's
-    steps, kept inside what is known to hold the root.
+    steps, kept inside what is known to hold the root. `free`: the current and the iron's flux without loss, `by_loss`: beta and b1.
     """
-    at0 = _locate(table.size, per_a, i0)
+    on_stator, (i_free, c1), (beta, b1) = 1.0 - machine.theta[SPLIT], free, by_loss
+    rows, per_a = loss.table.size, loss.per_a
+    at0 = _locate(rows, per_a, i0)
     i, low, high = guess, -np.inf, np.inf
     mean, by_i0, by_i1, g, slope_g = 0.0, 0.0, 0.0, 0.0, 0.0
     for _ in range(_MOST_STEPS):
-        mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i, at0, _locate(table.size, per_a, i))
-        g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1 * mean, power)
-        missed = i - free + beta * mean - on_stator * g
+        mean, by_i0, by_i1 = _mean_loss(loss, i0, i, at0, _locate(rows, per_a, i))
+        g, slope_g = _extra(machine, c1 - b1 * mean, power)
+        missed = i - i_free + beta * mean - on_stator * g
         if abs(missed) <= within:
             break
         if missed > 0.0:
@@ -228,49 +290,27 @@ def _add_directly(
 
 @njit(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def simulate(
-    u: Array,
-    y: Array,
-    weight: Array,
-    passes_zero: NDArray[np.bool_],
-    u_before: float,
-    ad: Array,
-    b1: Array,
-    b2: Array,
-    b_r: Array,
-    dad: Array,
-    db1: Array,
-    db2: Array,
-    db_r: Array,
-    theta: Array,
-    exponents: Exponents,
-    flux_scale: float,
-    basis: Array,
-    basis_integral: Array,
-    current_span: float,
+    measured: Measured,
+    held_input: Held,
+    machine: Machine,
+    shapes: Shapes,
     own: Array,
     delay: float,
-    wanted: Array,
-    information: Array,
-    score: Array,
-    block: int,
-    block_scores: Array,
-    residual: Array,
-    flux: Array,
-    rows: Array,
+    asked: Asked,
     is_linearised: bool,
 ) -> float:
-    """Residuals y - i into `residual`, the iron's flux into `flux`; where `is_linearised`, J^T W J and J^T W e added to `information`,
-    `score`, and the weighted sensitivities into `rows`: those of every sample where it has (n, p) rows, else of a stretch.
-
-    First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it, `b_r` (2, 2) to
-    a voltage held on the rotor; `dad` (2, 4, 2, 2), `db1`, `db2`, `db_r` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
-    `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
-    from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
-    (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
-    W e^2, infinite where the model runs away.
+    """Residuals y - i and the iron's flux; where `is_linearised`, normal equations and weighted sensitivities too, by the shared parameters
+    and the segment's `own` three. `delay` in periods. Returns sum W e^2, infinite where the model runs away.
     """
+    theta = machine.theta
+    u, y, weight, passes_zero = measured.u, measured.y, measured.weight, measured.passes_zero
+    ad, b1, b2, b_r = held_input.ad, held_input.b1, held_input.b2, held_input.b_r
+    dad, db1, db2, db_r = held_input.dad, held_input.db1, held_input.db2, held_input.db_r
+    basis, basis_integral, current_span = shapes.basis, shapes.integral, shapes.current_span
+    wanted, information, score, block = asked.wanted, asked.information, asked.score, asked.block
+    block_scores, residual, flux, rows = asked.block_scores, asked.residual, asked.flux, asked.rows
     p = wanted.size
-    k_f, extra_powers = basis.shape[1], exponents.size
+    k_f, extra_powers = basis.shape[1], machine.exponents.size
     first_f = SHARED + extra_powers
     first_own = first_f + k_f
     per_a = (basis.shape[0] - 1) / current_span
@@ -282,7 +322,7 @@ def simulate(
     for c in range(k_f):
         table += theta[first_f + c] * basis[:, c]
         integral += theta[first_f + c] * basis_integral[:, c]
-    furthest = np.max(np.abs(table))
+    furthest, loss = np.max(np.abs(table)), Loss(table, integral, per_a)
 
     x1, x2 = own[1], own[2]
     s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
@@ -291,7 +331,7 @@ def simulate(
     power = np.zeros(extra_powers + 1)
     s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
     x_iron = on_stator * x1 + on_rotor * x2
-    g, slope_g = _extra(theta, exponents, flux_scale, x_iron, power)
+    g, slope_g = _extra(machine, x_iron, power)
     g_last = g
     i = h_s * x1 + h_r * x2 + on_stator * g
     _add_directly(x1, x2, l_l, l_0, on_stator, g, slope_g, power, to_i, to_g)
@@ -300,7 +340,7 @@ def simulate(
         si[j] = h_s * s1[j] + h_r * s2[j] + on_stator * (dg[j] - to_g[j]) + to_i[j]
     dg_last[:] = dg
     missed, begun, keeps = np.zeros(ROWS), 0, rows.shape[0] == u.size
-    total, v_last, last_parts = 0.0, u_before, 1
+    total, v_last, last_parts = 0.0, measured.u_before, 1
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
@@ -345,17 +385,10 @@ def simulate(
             if k_f > 0:
                 free, within = h_s * c1 + h_r * c2, _SOLVED * (current_span + beta * furthest)
                 i, mean, by_i0, by_i1, g, slope_g = _current_at_end(
-                    theta,
-                    exponents,
-                    flux_scale,
-                    table,
-                    integral,
-                    per_a,
-                    free,
-                    on_stator * c1 + on_rotor * c2,
-                    beta,
-                    b_iron,
-                    on_stator,
+                    machine,
+                    loss,
+                    (free, on_stator * c1 + on_rotor * c2),
+                    (beta, b_iron),
                     i0,
                     free - beta * mean + on_stator * g,
                     within,
@@ -367,7 +400,7 @@ def simulate(
             x1, x2 = c1 - b11 * mean, c2 - b12 * mean
             x_iron = on_stator * x1 + on_rotor * x2
             if k_f == 0:
-                g, slope_g = _extra(theta, exponents, flux_scale, x_iron, power)
+                g, slope_g = _extra(machine, x_iron, power)
                 i = h_s * x1 + h_r * x2 + on_stator * g
             held -= mean
 

@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from commissioner.identify.batch import modal, output_error
 from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, SHARED, SPLIT, Matrix, ModelChoice
-from commissioner.identify.batch.output_error import ROWS
+from commissioner.identify.batch.output_error import ROWS, Asked, Held, Machine, Measured, Shapes
 from commissioner.identify.batch.segments import TABLE_ROWS, Segment
 from commissioner.records import Signal, peak
 
@@ -100,11 +100,11 @@ class Problem:
         moves = np.abs(np.diff(current_a, append=current_a[-1]))
         return np.asarray(np.abs(current_a) < near * self.model.leg.largest_a + 1.5 * moves)
 
-    def _held(self, circuit: Matrix, *, is_linearised: bool) -> tuple[Matrix, ...]:
+    def _held(self, circuit: Matrix, *, is_linearised: bool) -> Held:
         """Responses and derivatives (zero where nothing is linearised) over a period and over a part of one, stacked."""
         periods = (self.period_s / parts for parts in (1, output_error.PARTS))
         both = (_held_with_derivatives(circuit, period_s, is_linearised=is_linearised) for period_s in periods)
-        return tuple(np.stack(pair) for pair in zip(*both, strict=True))
+        return Held(*(np.stack(pair) for pair in zip(*both, strict=True)))
 
     def expect_leg(self, theta: Matrix) -> None:
         """Of the leg error is expected what its kind allows at the plateau it has in `theta`."""
@@ -141,7 +141,7 @@ class Problem:
         `near`, where they are kept: under half the time. `is_general`: with sensitivities also where two modes would do."""
         is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0 and not is_general
         is_near = near is not None and self.knows(near)
-        held = () if is_linear else self._held(theta[:CIRCUIT], is_linearised=not is_near)
+        held = None if is_linear else self._held(theta[:CIRCUIT], is_linearised=not is_near)
         information = near.information if near is not None and is_near else np.zeros((self.total, self.total))
         out = Evaluation(0.0, information, np.zeros(self.total), [], [], [], is_near)
         if not is_near and not is_linear:
@@ -156,7 +156,7 @@ class Problem:
             flux = over.flux[k] if over else np.empty_like(segment.current_a)
             shared = (information, score, block, scores, residual, flux)
             with np.errstate(over="ignore", invalid="ignore"):  # a trial step may run away
-                if is_linear:
+                if held is None:
                     squares = self._simulate_linear(k, theta, own[k], shared)
                 else:
                     squares = self._simulate(k, held, theta, own[k], shared, is_linearised=not is_near)
@@ -199,10 +199,8 @@ class Problem:
         columns = np.where(np.arange(modal.MODAL) < CIRCUIT, 1.0, wanted)
         gathered = np.zeros((kept.size, kept.size)), np.zeros(kept.size), np.zeros((scores.shape[0], kept.size))
         root = np.zeros(0) if segment.weight is None else np.sqrt(segment.weight)
-        squares = modal.modal_pass(
-            segment.voltage_v, segment.current_a, root, mode, flux_per_a, own[0], columns,
-            gathered[0], gathered[1], block, gathered[2], residual, flux,
-        )  # fmt: skip
+        asked = Asked(columns, *gathered[:2], block, gathered[2], residual, flux, np.zeros((0, 0)))
+        squares = modal.modal_pass(segment.voltage_v, segment.current_a, root, mode, flux_per_a, own[0], asked)
         chain = jacobian * wanted
         information[np.ix_(kept, kept)] = chain.T @ gathered[0] @ chain
         score[kept], scores[:, kept] = chain.T @ gathered[1], gathered[2] @ chain
@@ -211,7 +209,7 @@ class Problem:
     def _simulate(
         self,
         k: int,
-        held: tuple[Matrix, ...],
+        held: Held,
         theta: Matrix,
         own: Matrix,
         shared: tuple[Matrix, Matrix, int, Matrix, Matrix, Matrix],
@@ -221,39 +219,16 @@ class Problem:
         """One segment's pass; what it finds is written into `shared`. Not linearised: with the sensitivities that are kept."""
         segment, model = self.segments[k], self.model
         wanted = self.free[self.columns[k]].astype(np.float64)
-        information, score, block, scores, residual, flux = shared
+        _, score, block, scores, residual, _ = shared
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
-        ad, b1, b2, b_r, dad, db1, db2, db_r = held
         squares = output_error.simulate(
-            segment.voltage_v,
-            segment.current_a,
-            self.weights[k],
-            self.passes_zero[k],
-            before,
-            ad,
-            b1,
-            b2,
-            b_r,
-            dad,
-            db1,
-            db2,
-            db_r,
-            theta,
-            np.array(model.exponents, dtype=np.int64),
-            model.flux_scale_wb,
-            self.bases[k],
-            self.integrals[k],
-            self.current_span_a,
+            Measured(segment.voltage_v, before, segment.current_a, self.weights[k], self.passes_zero[k]),
+            held,
+            Machine(theta, np.array(model.exponents, dtype=np.int64), model.flux_scale_wb),
+            Shapes(self.bases[k], self.integrals[k], self.current_span_a),
             own,
             theta[DELAY] / self.period_s,
-            wanted,
-            information,
-            score,
-            block,
-            scores,
-            residual,
-            flux,
-            self._rows[k],
+            Asked(wanted, *shared, self._rows[k]),
             is_linearised,
         )
         if not is_linearised:

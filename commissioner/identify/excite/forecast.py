@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.identify.excite.tones import Excitation
 from commissioner.identify.inverter.staircase import InverterError
-from commissioner.identify.observer.kernels import forecast
+from commissioner.identify.observer.kernels import Held, forecast
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.standstill import held_input
 from commissioner.records import Signal
@@ -58,11 +58,10 @@ class Forecast:
         of_scale, lost_v = self.excitation.over_scale(time_s), loss * self.lost_v
         matrix, gain = held_input(machine, period_s)
         r_s, leakage = machine.stator_resistance_ohm, machine.leakage_inductance_h
+        held = Held(matrix, gain, r_s, leakage, lost_v, self.span_a)
 
         def peaks(scale: float | Signal) -> tuple[float, float]:
-            flux_wb, current_a = forecast(
-                of_scale(scale), period_s, matrix, gain, r_s, leakage, lost_v, self.span_a, *start
-            )
+            flux_wb, current_a = forecast(of_scale(scale), period_s, held, *start)
             return float(flux_wb), float(current_a)
 
         return peaks

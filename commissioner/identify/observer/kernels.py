@@ -16,6 +16,7 @@ G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, ch. V (
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,68 @@ OFFSET, THETA, PARAMETERS = 2, 3, 7
 FAST, LYAPUNOV, FROZEN, REVIEW = 0, 1, 2, 3
 """`REVIEW`: the fast law's recursion along the trajectory of held parameters, a Gauss-Newton step. What it finds is left in
 the state at `DEVIATION`."""
+
+
+class Samples(NamedTuple):
+    """One block: held voltages, V, and sampled currents, A, NaN where none was measured, (n,) each, `period` s apart."""
+
+    u: Array
+    y: Array
+    period: float
+
+
+class Adaptation(NamedTuple):
+    """`law` and what it goes by: poles `f` (2,) of the filters, samples over which the noise is known, dead zone, A, and gain `gamma` (4, 4) of the
+    Lyapunov law, and the least variance of the noise, A^2."""
+
+    law: int
+    f: Array
+    gamma: Array
+    noise_memory: float
+    dead_zone: float
+    noise_floor: float
+
+
+class TakenOff(NamedTuple):
+    """Of the plain machine: delay of the voltage in periods; the inverter's voltage error along the axis over current 0 ... `lost_span`; the
+    magnetizing current beyond the linear one over stator flux 0 ... `extra_span`. Tables of size 1: none."""
+
+    delay: float
+    lost_v: Array
+    lost_span: float
+    extra_a: Array
+    extra_span: float
+
+
+class Memory(NamedTuple):
+    """What a block leaves to the next: the state; theta and the offset (5,); Bierman's UD factors of the covariance, `upper` (7, 7) and
+    `diagonal` (7,); the machine (4,)."""
+
+    state: Array
+    theta: Array
+    upper: Array
+    diagonal: Array
+    machine: Array
+
+
+class Course(NamedTuple):
+    """What the observer says, (n,): current, A, rotor and stator flux, Wb."""
+
+    current: Array
+    rotor_flux: Array
+    stator_flux: Array
+
+
+class Held(NamedTuple):
+    """The linear machine between two samples: held-input model `matrix` (2, 2), `gain` (2,) of (i, psi_R); its R_s and leakage; the inverter's
+    loss F tabulated over current 0 ... `lost_span`."""
+
+    matrix: Array
+    gain: Array
+    r_s: float
+    leakage: float
+    lost_v: Array
+    lost_span: float
 
 
 @njit()
@@ -134,25 +197,14 @@ def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[fl
 
 
 @njit()
-def forecast(
-    u: Array,
-    period: float,
-    matrix: Array,
-    gain: Array,
-    r_s: float,
-    leakage: float,
-    lost_v: Array,
-    lost_span: float,
-    i: float,
-    psi_r: float,
-    free: float,
-) -> tuple[float, float]:
+def forecast(u: Array, period: float, held: Held, i: float, psi_r: float, free: float) -> tuple[float, float]:
     """(largest |stator flux|, largest |current|) under the voltages u, `(n,)`, held for `period` each: of the linear
     machine from (i, psi_R); the flux also of `free`, which integrates u - F(i) - R_s i.
 
-    `matrix`, `gain`: held-input model of (i, psi_R). F, the inverter's loss, tabulated over 0 ... `lost_span`, is taken
-    at the end of each period: i' + g F(i') = i' without loss.
+    F is taken at the end of each period: i' + g F(i') = i' without loss.
     """
+    matrix, gain, r_s, leakage = held.matrix, held.gain, held.r_s, held.leakage
+    lost_v, lost_span = held.lost_v, held.lost_span
     top, top_a = abs(free), abs(i)
     for k in range(u.size):
         known = matrix[0, 0] * i + matrix[0, 1] * psi_r + gain[0] * u[k]
@@ -228,20 +280,16 @@ def feed_back(
     loop: Array,
     open_loop: float,
     seen: float,
-    slope_now: float,
-    slope_next: float,
-    t1: float,
-    t2: float,
-    t3: float,
-    t4: float,
-    f1: float,
-    f2: float,
+    slopes: tuple[float, float],
+    t: tuple[float, float, float, float],
+    f: tuple[float, float],
 ) -> None:
     """The inverter's loss follows the predicted current: what that adds to the current's derivative by one number of theta.
 
     `loop` (4,) filters that derivative's feedback, two states of y and two of u; `open_loop` is its filter without it, `seen`
-    the derivative at this sample; `slope_*` the loss's slope at both ends of the period.
+    the derivative at this sample; `slopes` the loss's at both ends of the period; `t` theta, `f` the filters' poles.
     """
+    (t1, t2, t3, t4), (f1, f2), (slope_now, slope_next) = t, f, slopes
     g1, g2 = 1.0 - f1, 1.0 - f2
     gain = t3 * g1 + t4 * g2
     held = t1 * loop[0] + t2 * loop[1] + t3 * loop[2] + t4 * loop[3]
@@ -254,37 +302,17 @@ def feed_back(
 
 
 @njit()
-def advance(
-    u: Array,
-    y: Array,
-    f: Array,
-    period: float,
-    law: int,
-    noise_memory: float,
-    dead_zone: float,
-    noise_floor: float,
-    delay: float,
-    lost_v: Array,
-    lost_span: float,
-    extra_a: Array,
-    extra_span: float,
-    state: Array,
-    theta_in: Array,
-    upper: Array,
-    diagonal: Array,
-    gamma: Array,
-    machine: Array,
-    current: Array,
-    rotor_flux: Array,
-    stator_flux: Array,
-) -> None:
-    """Run the observer over one block of held voltages u and sampled currents y, `(n,)` each, updating all state.
-
-    `theta_in` (5,) is theta and the current offset. `upper` (7, 7) and `diagonal` (7,) factor the covariance
-    (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov law. `lost_v` tabulates the inverter's voltage error
-    along the axis over current 0 ... lost_span, `extra_a` the magnetizing current beyond the linear one over stator
-    flux 0 ... extra_span; size 1 = none. A current that is NaN was not measured: the observer runs on without it.
+def advance(samples: Samples, how: Adaptation, taken_off: TakenOff, memory: Memory, course: Course) -> None:
+    """Run the observer over one block, updating all of `memory`. A current that is NaN was not measured: the observer runs on
+    without it.
     """
+    u, y, period = samples.u, samples.y, samples.period
+    law, f, gamma, dead_zone, noise_floor = how.law, how.f, how.gamma, how.dead_zone, how.noise_floor
+    delay, lost_v, lost_span = taken_off.delay, taken_off.lost_v, taken_off.lost_span
+    extra_a, extra_span = taken_off.extra_a, taken_off.extra_span
+    state, theta_in, machine = memory.state, memory.theta, memory.machine
+    upper, diagonal = memory.upper, memory.diagonal
+    current, rotor_flux, stator_flux = course.current, course.rotor_flux, course.stator_flux
     f1, f2 = f[0], f[1]
     g1, g2 = 1.0 - f1, 1.0 - f2
     z1, z2, x1, x2 = state[0], state[1], state[2], state[3]
@@ -297,7 +325,7 @@ def advance(
     t1, t2, t3, t4, offset = theta_in[0], theta_in[1], theta_in[2], theta_in[3], theta_in[4]
     theta = np.empty(4)
     ad00, ad01 = flux_gains(machine, period)
-    beta = 1.0 / noise_memory
+    beta = 1.0 / how.noise_memory
     psi = np.zeros(PARAMETERS)
     v = np.zeros(PARAMETERS)
     ff = np.zeros(PARAMETERS)
@@ -421,7 +449,7 @@ def advance(
         if has_lost and recurses:
             for j in range(4):
                 open_loop = py1 if j == 0 else (py2 if j == 1 else (pu1 if j == 2 else pu2))
-                feed_back(loop[j], open_loop, seen[j], slope_now, slope_next, t1, t2, t3, t4, f1, f2)
+                feed_back(loop[j], open_loop, seen[j], (slope_now, slope_next), (t1, t2, t3, t4), (f1, f2))
         if absorbing:
             s1, s2 = t1 * d11 + t2 * d21, t1 * d12 + t2 * d22
             d11, d12 = f1 * d11 + g1 * s1, f1 * d12 + g1 * s2

@@ -278,31 +278,17 @@ class ParallelObserver:
         return self._kernel(shell, piece.voltage_v, piece.current_a, chosen if piece.adapts else kernels.FROZEN)
 
     def _kernel(self, shell: _Shell, voltage_v: Signal, current_a: Signal, law: int) -> tuple[Signal, Signal, Signal]:
-        signals = tuple(np.empty_like(voltage_v) for _ in range(3))
-        compensation = self.compensation
+        course = kernels.Course(*(np.empty_like(voltage_v) for _ in range(3)))
+        period_s, off = self.sample_period_s, self.compensation
+        memory_samples, floor_a2 = NOISE_MEMORY_S / period_s, (1e-9 * self.current_scale_a) ** 2
         kernels.advance(
-            voltage_v,
-            current_a,
-            self._filter,
-            self.sample_period_s,
-            law,
-            NOISE_MEMORY_S / self.sample_period_s,
-            self.dead_zone_a,
-            (1e-9 * self.current_scale_a) ** 2,
-            compensation.delay_s / self.sample_period_s,
-            compensation.lost_v,
-            compensation.lost_span_a,
-            compensation.extra_a,
-            compensation.extra_span_wb,
-            shell.state,
-            shell.theta,
-            shell.upper,
-            shell.diagonal,
-            self._gamma,
-            shell.machine,
-            *signals,
+            kernels.Samples(voltage_v, current_a, period_s),
+            kernels.Adaptation(law, self._filter, self._gamma, memory_samples, self.dead_zone_a, floor_a2),
+            kernels.TakenOff(off.delay_s / period_s, off.lost_v, off.lost_span_a, off.extra_a, off.extra_span_wb),
+            kernels.Memory(shell.state, shell.theta, shell.upper, shell.diagonal, shell.machine),
+            course,
         )
-        return signals[0], signals[1], signals[2]
+        return course
 
     @property
     def parameters(self) -> InverseGamma:

@@ -69,16 +69,16 @@ def covers(folder: Path, names: Iterable[str]) -> dict[str, Covered]:
     return {name: cover(folder / name) for name in wanted if (folder / name).is_file()}
 
 
-def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Covered]:
     """Names and digests of what these records of a journal speak of, the last one of each."""
-    found: dict[str, Any] = {}
+    found: dict[str, Covered] = {}
     for line in records:
         files = line["record"].get("files") if isinstance(line["record"], dict) else None
         found |= files if isinstance(files, dict) else {}
     return found
 
 
-def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, Covered]:
     """What a session that was killed before it closed the folder had said would take a file's place: the file may be either."""
     last = max((number for number, line in enumerate(journal) if line["kind"] == CLOSED), default=len(journal))
     return covered_files(line for line in journal[last + 1 :] if line["kind"] == TO_COME)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.estimation.kernels.march import STATES, UNSET, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, load_tangents, march, tangents
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
 
 SCALES = Scales(11.7, 326.6, 314.16, 26.0, 2)
@@ -41,8 +41,8 @@ def run(p, count, *, is_free, start=None, speed=300.0):
     voltage, w = forcing(count, speed)
     out, shaft = np.empty((count, 3)), np.empty((count, 2))
     x = np.zeros(STATES) if start is None else start.copy()
-    knots, places = np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1)
-    march(p, SCALES.as_tuple(), x, voltage, w, knots, places, PERIOD, is_free, out, shaft)
+    load = Load(np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1))
+    march(p, SCALES.as_tuple(), x, voltage, w, load, PERIOD, is_free, out, shaft)
     return out, shaft
 
 
@@ -50,11 +50,10 @@ def run(p, count, *, is_free, start=None, speed=300.0):
 def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
     count, p = 400, numbers(SPOKEN)
     voltage, w = forcing(count)
-    knots, places = np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1)
+    load = Load(np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1))
     exact, none_x = np.empty((COUNT, count, 3)), np.zeros((COUNT, STATES))
-    tangents(
-        p, SCALES.as_tuple(), np.zeros(STATES), np.eye(COUNT), none_x, voltage, w, knots, places, PERIOD, is_free, exact
-    )
+    along = Directions(np.eye(COUNT), none_x)
+    tangents(p, SCALES.as_tuple(), np.zeros(STATES), along, voltage, w, load, PERIOD, is_free, exact)
     for k, name in enumerate(NAMES):
         step = 1e-5 * max(abs(p[k]), 0.05 if name not in DEFAULTS else p[k])
         up, down = p.copy(), p.copy()
@@ -65,18 +64,18 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
 
 
 COUNT_LOADED = 40
-LOAD = (np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 2 * COUNT_LOADED - 1))
+LOAD = Load(np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 2.9, 2 * COUNT_LOADED - 1))
 """Four knots over as many samples."""
 
 
 def complex_marches():
     """(4, 100, 3): derivatives of the currents by each knot, from marches of complex numbers that are moved along it by 1e-30 i."""
-    count, (knots, places), whole = COUNT_LOADED, LOAD, []
+    count, whole = COUNT_LOADED, []
     p, x = numbers(SPOKEN) + 0j, np.zeros(STATES, dtype=complex)
     for direction in np.eye(4):
         out, shaft = np.empty((count, 3), dtype=complex), np.empty((count, 2), dtype=complex)
-        moved = knots + 1e-30j * direction
-        march(p, SCALES.as_tuple(), x.copy(), *forcing(count), moved, places, PERIOD, True, out, shaft)
+        moved = Load(LOAD.knots + 1e-30j * direction, LOAD.places)
+        march(p, SCALES.as_tuple(), x.copy(), *forcing(count), moved, PERIOD, True, out, shaft)
         whole.append(out.imag / 1e-30)
     return np.array(whole)
 
@@ -95,7 +94,7 @@ def exact(tmp_path_factory):
 def test_derivatives_along_the_loads_knots_are_those_of_complex_marches(exact, many):
     """Everything else in the machine spoken for; asked for all of them or for the first three."""
     found = np.empty((many, COUNT_LOADED, 3))
-    load_tangents(numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), *forcing(COUNT_LOADED), *LOAD, PERIOD, found)
+    load_tangents(numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), *forcing(COUNT_LOADED), LOAD, PERIOD, found)
     for one, whole in zip(found, exact, strict=False):
         assert np.abs(whole).max() > 0.0
         assert np.abs(one - whole).max() <= 1e-11 * np.abs(whole).max()
@@ -108,7 +107,18 @@ def test_steady_current_is_that_of_the_circuit():
     voltage = 326.6 * np.stack([np.cos(314.16 * t), np.sin(314.16 * t)], axis=1)
     w = np.stack([np.full(t.size, 300.0), np.zeros(t.size)], axis=1)
     out, shaft = np.empty((count, 3)), np.empty((count, 2))
-    march(p, SCALES.as_tuple(), np.zeros(STATES), voltage, w, np.zeros(2), np.zeros(t.size), PERIOD, False, out, shaft)
+    march(
+        p,
+        SCALES.as_tuple(),
+        np.zeros(STATES),
+        voltage,
+        w,
+        Load(np.zeros(2), np.zeros(t.size)),
+        PERIOD,
+        False,
+        out,
+        shaft,
+    )
     slip = 1.0 - 300.0 / 314.16
     rotor = p[1] / slip
     impedance = p[0] + 314.16j * p[2] + 314.16j * p[3] * rotor / (314.16j * p[3] + rotor)
@@ -149,7 +159,18 @@ def test_a_start_is_that_of_the_simulator_with_another_circuit():
     out, shaft = np.empty((u.size, 3)), np.empty((u.size, 2))
     speed = np.stack([between(w * pairs), np.zeros(2 * u.size - 1)], axis=1)
     voltage = np.stack([between(u.real), between(u.imag)], axis=1)
-    march(p, scales.as_tuple(), psi_s, voltage, speed, np.zeros(2), np.zeros(2 * u.size - 1), PERIOD, False, out, shaft)
+    march(
+        p,
+        scales.as_tuple(),
+        psi_s,
+        voltage,
+        speed,
+        Load(np.zeros(2), np.zeros(2 * u.size - 1)),
+        PERIOD,
+        False,
+        out,
+        shaft,
+    )
     error = np.hypot(out[5:, 0] - i[5:].real, out[5:, 1] - i[5:].imag)
     assert np.sqrt(np.mean(error**2)) < 5e-4 * np.abs(i).max()
 
@@ -195,12 +216,12 @@ def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns()
     """Without voltage. At rest none of its torque moves the shaft; turning with W, a cos(2 theta) of it swings the speed by a T / (2 J W)."""
     p, count, x = numbers({"load_ripple_cos": 0.06, "load_ripple_cos_2": 0.03, "inertia": 0.1}), 500, np.zeros(STATES)
     t = 0.5 * PERIOD * np.arange(2 * count - 1)
-    none, knots = np.zeros((t.size, 2)), np.zeros(2)
+    none, load = np.zeros((t.size, 2)), Load(np.zeros(2), np.zeros(t.size))
     out, shaft = np.empty((count, 3)), np.empty((count, 2))
-    march(p, SCALES.as_tuple(), x.copy(), none, none, knots, np.zeros(t.size), PERIOD, True, out, shaft)
+    march(p, SCALES.as_tuple(), x.copy(), none, none, load, PERIOD, True, out, shaft)
     assert np.abs(shaft[:, 0]).max() == 0.0
     x[8], p[AT["load_ripple_cos"]] = 300.0, 0.0
-    march(p, SCALES.as_tuple(), x, none, none, knots, np.zeros(t.size), PERIOD, True, out, shaft)
+    march(p, SCALES.as_tuple(), x, none, none, load, PERIOD, True, out, shaft)
     swing = -0.03 * 26.0 / 0.1 / (2 * 150.0) * np.sin(2 * 150.0 * t[::2])
     assert (shaft[:, 0] - 300.0) / 2 == pytest.approx(swing, abs=0.02 * np.abs(swing).max())
 
@@ -214,7 +235,7 @@ def test_a_fan_brakes_a_shaft_that_turns_either_way():
     for way in (1.0, -1.0):
         x = np.zeros(STATES)
         x[8] = way * 300.0
-        march(p, SCALES.as_tuple(), x, none, none, np.zeros(2), np.zeros(t.size), PERIOD, True, out, shaft)
+        march(p, SCALES.as_tuple(), x, none, none, Load(np.zeros(2), np.zeros(t.size)), PERIOD, True, out, shaft)
         assert way * shaft[:, 0] == pytest.approx(slowed, rel=1e-6)
 
 
