@@ -34,7 +34,7 @@ def driven(
     first[:4] = stator_flux_wb.real, stator_flux_wb.imag, rotor_flux_wb.real, rotor_flux_wb.imag
     voltage = np.stack([between(voltage_v.real), between(voltage_v.imag)], axis=1)
     speed = np.stack([between(electrical_speed_rad_per_s), np.zeros(2 * count - 1)], axis=1)
-    out, shaft, no_scales = np.zeros((count, 3)), np.zeros((count, 2)), (1.0,) * 5
+    out, shaft, no_scales = np.zeros((count, 3)), np.zeros((count, 2)), (*(1.0,) * 5, 0.0)
     no_load = Load(np.zeros(2), np.zeros(2 * count - 1))
     march(p, no_scales, first, voltage, speed, no_load, period_s, False, out, shaft)
     return np.asarray(out[:, 0] + 1j * out[:, 1])

@@ -57,6 +57,8 @@ def _shaken(problem: Problem, drawn: Sequence[tuple[Array, Array]], sign: float)
         turning = w.speed.copy()
         turning[:, 0] += sign * between(speed)
         added = np.stack([between(volts[:, k]) for k in range(2)], axis=1)
+        if problem.record.scales.is_held:
+            added[1::2] = added[:-2:2]
         noisy.append(replace(w, voltage=w.voltage + sign * added, speed=turning))
     return replace(problem, record=replace(problem.record, windows=tuple(noisy)))
 

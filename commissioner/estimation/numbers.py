@@ -43,14 +43,23 @@ of rated peak current; kg m^2."""
 
 @dataclass(frozen=True)
 class Scales:
-    """What the additions are relative to: rated peak current, phase peak voltage, frequency, torque, and the pole pairs."""
+    """What the additions are relative to: rated peak current, phase peak voltage, frequency, torque, and the pole pairs. `is_held`: the voltage
+    stays from a sample to the next."""
 
     current_a: float
     voltage_v: float
     frequency_rad_per_s: float
     torque_nm: float
     pole_pairs: int
+    is_held: bool = False
 
     def as_tuple(self) -> tuple[float, ...]:
         """As the kernel takes them."""
-        return (self.current_a, self.voltage_v, self.frequency_rad_per_s, self.torque_nm, float(self.pole_pairs))
+        return (
+            self.current_a,
+            self.voltage_v,
+            self.frequency_rad_per_s,
+            self.torque_nm,
+            float(self.pole_pairs),
+            float(self.is_held),
+        )

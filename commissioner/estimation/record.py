@@ -48,16 +48,22 @@ MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
+RENEWALS, RENEWED_TO = (1, 2), 0.02
+"""Rows a carrier period where each has its own voltage, which an inverter renews once or twice a period; how near to that."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
 """Shortest window; fewest samples a period of the supply."""
 AS_NAMED = 0.99
 """Of that rate: 2 kHz at 50 Hz are 39.99 where the mains stand a little above."""
+LEAST_SAMPLES = 50
+"""Of a file: fewer tell neither noise nor the supply's turning."""
 MONITORED_S, MONITORED_RATE = 2.0, 10.0
 """Shortest steady stretch and fewest samples a period that `monitor` reads: it asks for less than a fit of the current's own course."""
 FAST_HZ = 5000.0
 """Rate that shows a start's first milliseconds at the supplies of 50 and 60 Hz."""
 MOST_SAMPLES = 60_000
 """Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
+MOST_OVER_FIELD = 1.5
+"""Speed of a shaft over that of its field, beyond which it is in another unit: a load that drives takes a motor some per cent over, breakdown a fifth."""
 NOISY_VOLTAGE = 0.15
 """Sample-to-sample noise over rated peak beyond which a voltage is pulses, not a waveform."""
 
@@ -86,7 +92,8 @@ class Window:
 
 @dataclass(frozen=True)
 class Record:
-    """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
+    """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `is_renewed`: a row for each voltage that
+    the inverter makes; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
     of the electrical speed before smoothing."""
 
     windows: tuple[Window, ...]
@@ -96,6 +103,7 @@ class Record:
     has_speed: bool
     has_zero: bool
     is_commanded: bool
+    is_renewed: bool
     sigma_a: tuple[float, float, float]
     sigma_v: float
     sigma_w: float = 0.0
@@ -215,13 +223,18 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     remarks += _of_third_current(computed, has_zero)
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
-    commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
+    carrier = float(recordings[0].metadata.get("switching_frequency_hz") or 0.0)
     return Record(
-        tuple(windows), period, scales, plate, has_speed, has_zero, commanded, (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
+        tuple(windows), period, scales, plate, has_speed, has_zero, carrier > 0.0, _is_renewed(carrier, period), (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _is_renewed(carrier_hz: float, period_s: float) -> bool:
+    """Whether rows and what an inverter renews its voltage by go together."""
+    return carrier_hz > 0.0 and any(abs(1.0 / (carrier_hz * period_s) / k - 1.0) < RENEWED_TO for k in RENEWALS)
 
 
 def _of_third_current(computed: Sequence[str], has_zero: bool) -> Iterator[str]:
@@ -285,6 +298,11 @@ def _vector(x: Array) -> Array:
 
 def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
+    if one.time_s.size < LEAST_SAMPLES:
+        raise _refused(
+            f"{one.source}: {one.time_s.size} samples are no recording", one.time_s.size, f"{LEAST_SAMPLES} samples, and {LEAST_S} s of a motor that is fed",
+            "record a start, load steps, or a second of steady running",
+        )  # fmt: skip
     if per_period < AS_NAMED * LEAST_RATE:
         least = LEAST_RATE * scales.frequency_rad_per_s / (2 * np.pi)
         raise _refused(
@@ -293,12 +311,32 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{least:.0f} samples a second",
             f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
+    _check_speed(one, voltage, scales)
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:
         raise _refused(
             f"{one.source}: the voltages are pulses of an inverter, not their means", sigma, NOISY_VOLTAGE * scales.voltage_v,
             "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages"
             f"{_for_monitor(one, per_period)}",
+        )  # fmt: skip
+
+
+def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
+    """Refused where the shaft is told to turn much faster than the field of the voltage: another unit."""
+    if one.speed_rad_per_s is None:
+        return
+    block = max(round(BLOCK_S / one.sample_period_s), 2)
+    whole = one.time_s.size // block * block
+    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
+    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
+    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[:whole].reshape(-1, block)).mean(axis=1)
+    is_fed = (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & np.isfinite(speed) & (turn > 0.0)
+    ratio = float(np.median(speed[is_fed] / turn[is_fed])) if is_fed.any() else 0.0
+    if ratio > MOST_OVER_FIELD:
+        raise _refused(
+            f"{one.source}: the shaft would turn {ratio:.3g} times as fast as the field that the voltage makes", ratio, MOST_OVER_FIELD,
+            "the column is the shaft's speed in rad/s (9.55 times too much: it is in rev/min, which the column speed_rpm takes; as many times as "
+            "the poles have pairs: it is the electrical one)",
         )  # fmt: skip
 
 

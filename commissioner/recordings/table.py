@@ -378,7 +378,7 @@ def sample_period(table: Table, segment: Signal) -> float:
 def _usual_step(time: Signal) -> float:
     """The median step, or the mean where stamps are so coarse that it lies apart (seconds since 1970 have steps of 0.24 us)."""
     steps = np.diff(time)
-    usual = float(np.median(steps))
+    usual = float(np.median(steps)) if steps.size else float("nan")
     mean = _mean_step(steps) if usual > 0.0 else usual
     return mean if abs(mean - usual) > COARSE_STEP * usual else usual
 

@@ -25,7 +25,8 @@ from commissioner.estimation.fit import (
     refine,
     simulate,
 )
-from commissioner.estimation.hidden import OF_LAW, drawn_aside, with_told
+from commissioner.estimation.held import best_reading
+from commissioner.estimation.hidden import by_laws, drawn_aside, told_in, with_told
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
@@ -41,7 +42,6 @@ Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
 """Between speeds that count as independent: the span over which they were smoothed."""
 AFTER_START_S = 0.15
-IN_EVERY_MOTOR = {"an iron loss": "iron_conductance", "current displacement in the bars": "bar_resistance"}
 SPEED_LAG = Column("p", AT["speed_lag"])
 """Every column of speed may be late: a counting interval, a filter."""
 PARTS = 10
@@ -81,7 +81,8 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
         record = _until_first_step(record)
     problem = problem_of(record, 0.0)
     fit = with_speed(problem) if record.has_speed else with_shaft(problem, smooth_load=record.has_start)
-    problem = with_noise_of(problem, fit.machine)
+    problem, fit = best_reading(problem, fit)
+    record, problem = problem.record, with_noise_of(problem, fit.machine)
     columns, shift = fit.columns, 0.0
     if record.has_speed and record.has_start:
         columns = (*columns, SPEED_LAG)
@@ -93,13 +94,12 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     of_slope, fit = fit.machine.theta[: len(FOUR)], refine(problem, start, columns)
     by_lag = fit.machine.theta[: len(FOUR)] - of_slope if shift else np.zeros(len(FOUR))
     require_a_motor(problem, fit)
-    narrow, fit = fit, with_told(problem, fit)
-    by_law = OF_LAW * (fit.machine.theta - narrow.machine.theta)[: len(FOUR)]
+    fit = with_told(problem, fit)
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
     noise_only = _of_four(fit, fit.covariance())
     whole = _covariance(problem, fit)
-    beside = np.array([by_lag, by_law])  # a filter or a counter, where iron acts: not known
+    beside = np.vstack([by_lag, by_laws(fit)])  # a filter or a counter, where iron acts: not known
     covariance = _of_four(fit, whole) + beside.T @ beside
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
@@ -291,7 +291,7 @@ def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | Non
         out.append(
             f"The four numbers leave {worst:.2g} times the noise: something is missing (saturation, deep bars, sensors) that may have drawn them aside by more than their intervals, widened as these are; `commissioner diagnose` names it."
         )
-    if told := [cause for cause, name in IN_EVERY_MOTOR.items() if Column("p", AT[name]) in fit.columns]:
+    if told := [hidden.words for hidden in told_in(fit)]:
         out.append(f"In the fit besides: {' and '.join(told)}, which explain what the four numbers left.")
     if not record.has_speed and record.has_start:
         out.append(

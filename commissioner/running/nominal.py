@@ -21,6 +21,7 @@ from commissioner.estimation.fit import (
     residuals,
     with_knots_at,
 )
+from commissioner.estimation.held import best_reading
 from commissioner.estimation.noisy_input import with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import BLOCK_S, STATES, Record
@@ -69,7 +70,7 @@ def nominal(problem: Problem) -> tuple[Problem, Fit]:
     """The problem with noise that went through the machine, and the fit. DataRefused where no machine fits at all."""
     record = problem.record
     fit = with_speed(problem) if record.has_speed else with_shaft(problem)
-    problem, fit = weighted(problem, fit)
+    problem, fit = weighted(*best_reading(problem, fit))
     if not record.has_speed:
         fit = _with_load_changes(problem, fit)
     require_a_motor(problem, fit)

@@ -65,7 +65,7 @@ def _on_mains(
     u = scales.voltage_v * np.exp(1j * scales.frequency_rad_per_s * t)
     voltage = np.stack([between(u.real), between(u.imag)], axis=1)
     window = Window(t, np.zeros((count, 3)), voltage, np.zeros((2 * count - 1, 2)), np.zeros(count, np.int64), True)
-    record = Record((window,), period, scales, plate, False, True, False, (1.0, 1.0, 1.0), 0.0)
+    record = Record((window,), period, scales, plate, False, True, False, False, (1.0, 1.0, 1.0), 0.0)
     inertia = float(
         scenario.get("machine", {}).get(
             "inertia_kg_m2", 0.5 * scales.torque_nm * scales.pole_pairs / scales.frequency_rad_per_s

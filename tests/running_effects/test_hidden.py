@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Column, Fit, Machine, Problem
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.running import identification
 from commissioner.running.identification import identify
 from tests.running_effects.cases import Case, taken
@@ -43,6 +45,62 @@ def test_iron_and_bars_that_one_start_tells_are_both_in_the_fit() -> None:
     r_r = found.parameters["rotor_resistance_ohm"]
     assert abs(r_r.value - FOUR["rotor_resistance"]) < 3.0 * r_r.std
     assert any("an iron loss and current displacement in the bars" in r for r in found.remarks)
+
+
+@pytest.mark.parametrize("corner", [50.0, 600.0])
+def test_bars_of_another_corner_are_in_the_fit(corner: float) -> None:
+    """Held at 138 rad/s their corner left L_sigma 7 to 50 % off, up to five stated errors, and R_s 9 to 45 %."""
+    found = identify([started(PLATE, bar_resistance=1.0, bar_corner=corner)], PLATE)
+    for name, own in zip(("leakage_inductance_h", "stator_resistance_ohm"), ("leakage_inductance", "stator_resistance"), strict=True):  # fmt: skip
+        quantity = found.parameters[name]
+        assert abs(quantity.value - FOUR[own]) < 3.0 * quantity.std
+        assert quantity.value == pytest.approx(FOUR[own], rel=0.02)
+    assert any("current displacement in the bars" in r for r in found.remarks)
+
+
+def test_currents_that_are_late_leave_the_four_where_they_are() -> None:
+    """A quarter of a period between the channels: a cable of filters, or a scan of one channel after the other."""
+    found = identify([started(PLATE, delay=5e-5)], PLATE)
+    for name, own in zip(PARAMETERS, FOUR, strict=True):
+        quantity = found.parameters[name]
+        assert abs(quantity.value - FOUR[own]) < 3.0 * quantity.std
+    assert any("a time between currents and voltages" in r for r in found.remarks)
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_unlike_voltage_gains_are_in_the_errors_under_one_load(seed: int) -> None:
+    """A channel of class 0.2 drew R_s 23 to 50 % aside in three motors, and nothing was left to tell it by."""
+    recording, plate, truth = taken(Case(seed, "null", "steady").scenario(), seed)
+    u, v, w = recording.voltages_v
+    found = identify([replace(recording, voltages_v=(1.002 * u, v, w))], plate)
+    for name, value in truth["inverse_gamma"].items():
+        own = found.parameters[name]
+        assert abs(own.value - value) < 3.0 * own.std, (name, own, value)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 49, 51, 120])
+def test_a_file_of_a_few_rows_is_refused_with_its_remedy(count: int) -> None:
+    """Two rows ended in an error of the smoothing, as a defect."""
+    whole = started(PLATE)
+    i, v = ([x[:count] for x in group] for group in (whole.currents_a, whole.voltages_v))
+    assert whole.speed_rad_per_s is not None
+    short = replace(
+        whole, time_s=whole.time_s[:count], currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2]),
+        speed_rad_per_s=whole.speed_rad_per_s[:count],
+    )  # fmt: skip
+    with pytest.raises(DataRefused, match=r"no recording|long enough") as refused:
+        identify([short], PLATE)
+    assert refused.value.remedy
+
+
+@pytest.mark.parametrize("factor", [60.0 / (2.0 * np.pi), 2.0])
+def test_a_speed_in_another_unit_is_named(factor: float) -> None:
+    """Rev/min or the electrical speed under the name of rad/s: the refusal had spoken of a magnetizing inductance of 1e-09 H."""
+    whole = started(PLATE)
+    assert whole.speed_rad_per_s is not None
+    with pytest.raises(DataRefused, match="as fast as the field") as refused:
+        identify([replace(whole, speed_rad_per_s=factor * whole.speed_rad_per_s)], PLATE)
+    assert "speed_rpm" in refused.value.remedy
 
 
 def test_a_valley_without_a_rotor_is_refused_by_identify_too(monkeypatch: pytest.MonkeyPatch) -> None:

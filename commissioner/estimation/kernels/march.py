@@ -122,10 +122,11 @@ def march(p, scales, x, voltage, speed, load_torque, period, is_free, out, shaft
 
     `voltage` (2n - 1, 2) and `speed` (2n - 1, 2: electrical speed, its derivative) at samples and between them; with
     `is_free` the speed follows from the shaft and the `load_torque`.
+    Where `scales` says that the voltage is held, each step has what stands midway to its end.
     `x` is the state at the first sample and is overwritten. Types follow `p`.
     """
     knots, places = load_torque.knots, load_torque.places
-    current, volt, w_n, torque_n, pairs = scales
+    current, volt, w_n, torque_n, pairs, holds = scales
     flux2 = 1.0 / (volt / w_n) ** 2
     n = out.shape[0]
     one = p[0] * 0.0
@@ -177,7 +178,8 @@ def march(p, scales, x, voltage, speed, load_torque, period, is_free, out, shaft
                 if has_ripple:
                     w += w_n * (p[W_RIPPLE] * np.cos(y[9] / pairs) + p[W_RIPPLE + 1] * np.sin(y[9] / pairs))
             # terminal voltage
-            ma, mb = voltage[m, 0], voltage[m, 1]
+            end = m - 1 if stage == 3 and holds else m  # a held voltage ends as it is midway
+            ma, mb = voltage[end, 0], voltage[end, 1]
             ua = ma + p[V_GAIN] * ma + p[V_GAIN + 1] * mb + volt * p[V_OFFSET]
             ub = mb - p[V_GAIN] * mb + p[V_GAIN + 1] * ma + volt * p[V_OFFSET + 1]
             # currents
