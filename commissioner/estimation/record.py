@@ -223,12 +223,23 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     remarks += _of_third_current(computed, has_zero)
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
-    carrier = float(recordings[0].metadata.get("switching_frequency_hz") or 0.0)
+    carrier = _carrier_hz(recordings[0])
     return Record(
         tuple(windows), period, scales, plate, has_speed, has_zero, carrier > 0.0, _is_renewed(carrier, period), (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
+    )  # fmt: skip
+
+
+def _carrier_hz(one: RunningRecording) -> float:
+    """Of an inverter that feeds the motor; 0 where the recording names none. DataRefused: what it names is no frequency."""
+    named = one.metadata.get("switching_frequency_hz") or 0.0
+    if isinstance(named, int | float) and 0.0 <= named < np.inf:
+        return float(named)
+    raise _refused(
+        f"{one.source}: switching_frequency_hz is no frequency", named, "a number of Hz, 0 or none on the mains",
+        "write the inverter's carrier frequency in Hz, or leave the line out",
     )  # fmt: skip
 
 

@@ -273,3 +273,19 @@ def test_2_khz_are_40_samples_a_period_of_the_mains_as_they_are(supply_hz, is_re
         assert ("too few" in refused.what) is not is_read
     else:
         assert is_read
+
+
+@pytest.mark.parametrize(("named", "is_carried"), [(4000.0, True), (4000, True), (0.0, False), ("", False)])
+def test_an_inverter_is_what_names_its_carrier(start, named, is_carried):
+    recording, plate = start
+    metadata = dict(recording.metadata) | {"switching_frequency_hz": named}
+    assert prepare([replace(recording, metadata=metadata)], plate).is_commanded is is_carried
+
+
+@pytest.mark.parametrize("named", ["4 kHz", "abc", -4000.0, float("nan"), float("inf")])
+def test_a_carrier_that_is_no_frequency_is_refused(start, named):
+    recording, plate = start
+    metadata = dict(recording.metadata) | {"switching_frequency_hz": named}
+    with pytest.raises(DataRefused, match="switching_frequency_hz is no frequency") as refused:
+        prepare([replace(recording, metadata=metadata)], plate)
+    assert "in Hz" in refused.value.remedy
