@@ -36,15 +36,23 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m sim", description=__doc__)
-    parser.add_argument("--scenario", default="default", help="name of a scenario, or a TOML file")
+    parser = argparse.ArgumentParser(
+        prog="python -m sim",
+        description=__doc__,
+        epilog="A served drive answers once `ready` is printed; the first start compiles for up to a minute before. Ctrl-C ends it.",
+    )
+    parser.add_argument("--scenario", default="default", help="name of a scenario (--list), or a TOML file")
     parser.add_argument("--tcp", type=_port, default=-1, metavar="PORT", help="serve Modbus TCP; 0 = any free port")
     parser.add_argument("--rtu", default="", metavar="PATH", help="serve Modbus RTU on a serial device, or `pty`")
-    parser.add_argument("--baud", type=int, default=921600)
-    parser.add_argument("--parity", choices="NEO", default="N")
-    parser.add_argument("--pace", action="store_true", help="a pty takes the time that its baud rate takes")
+    parser.add_argument("--baud", type=int, default=921600, help="of --rtu")
+    parser.add_argument("--parity", choices="NEO", default="N", help="of --rtu: none, even, odd")
+    parser.add_argument("--pace", action="store_true", help="a pty is as slow as its baud rate")
     parser.add_argument(
-        "--turnaround-ms", type=float, default=0.0, help="a paced line's slave begins its answer so late"
+        "--turnaround-ms",
+        type=float,
+        default=0.0,
+        metavar="MS",
+        help="with --pace: time before the drive begins its answer",
     )
     parser.add_argument(
         "--tls", type=_port, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port"
@@ -52,12 +60,20 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--cert", type=Path, help="server certificate (PEM)")
     parser.add_argument("--key", type=Path, help="its key (PEM)")
     parser.add_argument("--ca", type=Path, help="certificate authority that client certificates must come from")
-    parser.add_argument("--speed", default="1", help="1, N times real time, or `max`: paced by the reader")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--speed",
+        default="1",
+        help="1: real time; N: N times as fast; `max`: as fast as the samples are fetched, for CI and busy computers",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the simulated noise")
     parser.add_argument("--nvm", type=Path, help="file that is the drive's non-volatile memory")
     parser.add_argument("--state-log", type=Path, help="JSON lines of what is really true")
     parser.add_argument(
-        "--fault", action="append", default=[], metavar="NAME[:ARG][@WHEN]", help="see sim/wire/faults.py"
+        "--fault",
+        action="append",
+        default=[],
+        metavar="NAME[:ARG][@WHEN]",
+        help="a fault on the wire or in the drive, as lost@700 or sample_gap:5@e1.0s; repeatable; an unknown name is answered with those there are",
     )
     parser.add_argument("--truth", action="store_true", help="print the answer key as JSON")
     parser.add_argument("--recording", type=Path, metavar="FILE", help="write a recording (.csv, .csv.gz, .parquet)")

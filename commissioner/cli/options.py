@@ -26,7 +26,8 @@ Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config
 Drive = Annotated[
     str,
     typer.Option(
-        "--drive", help="tcp://host:port?device=1, tls://host:802?..., rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1"
+        "--drive",
+        help="tcp://HOST:PORT?device=1, tls://HOST:802?..., rtu:///dev/ttyUSB0?baud=115200 or rtu://COM3?parity=E&device=1",
     ),
 ]
 Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in config/drives or a .toml file.")]

@@ -65,7 +65,7 @@ class Rows:
         if lines.is_file():
             if not resume:
                 raise UsageError(
-                    f"{folder} holds the rows of a study", step="study", value=str(lines), limit="an empty folder, or --resume",
+                    f"the folder {folder} holds a study already", step="study", value=str(lines), limit="an empty folder, or --resume",
                     remedy="give --resume to finish it, or another --out",
                 )  # fmt: skip
             if _asked_before(known) != plain(asked):

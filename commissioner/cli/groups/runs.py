@@ -109,7 +109,12 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 @runs_app.command("export")
 def runs_export(
     run: Run,
-    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz, .parquet or .mat for samples.")],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            help="Target. Samples: .csv, .csv.gz, .parquet, .mat. Parameters: .csv, .json, .py (motulator), .mat (matlab), .mo (modelica)."
+        ),
+    ],
     form: Annotated[str, typer.Option("--form", help="samples, csv, json, motulator, matlab or modelica.")] = "samples",
     salvage: Salvage = False,
     runs: Runs = RUNS,

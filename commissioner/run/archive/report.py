@@ -38,7 +38,11 @@ def mark_restored(run: RunSummary, key: bytes | None = None) -> None:
 
 def mark_written(run: RunSummary, key: bytes | None = None) -> None:
     """The report says on top that the drive holds the values that were only accepted when it was made."""
-    _mark(run, "Written on {}: the drive took the values of this report, read back.", key)
+    _mark(
+        run,
+        "Written on {}, after this report was made: the drive took its values, read back. Where it says `not written`, that was before.",
+        key,
+    )
 
 
 def _mark(run: RunSummary, sentence: str, key: bytes | None) -> None:

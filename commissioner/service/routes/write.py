@@ -72,7 +72,7 @@ async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> Wr
     if drive is not None:
         _must_be_free(parts, drive, what)
         parts.desk.control(drive.id).take(who.party)
-    await parts.note(who, f"asked to {what}", run=run, table=token)
+    await parts.note(who, f"asked to {what.replace('-', ' ')}", run=run, table=token)
     arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
     done = await _with_drive(parts, drive, arguments, ACT_S)
     rows = (done.get("report") or done).get("written") or []

@@ -28,11 +28,17 @@ def test_list_names_every_file_with_what_it_can(capsys):
     assert {row["name"]: row["tune"] for row in rows}["danfoss_fc302"] == "assisted"
 
 
-@pytest.mark.parametrize("name", ["danfoss_fc302", "weg_cfw700", "simulated"])
+@pytest.mark.parametrize("name", ["danfoss_fc302", "weg_cfw700"])
 def test_validate_carries_the_worked_examples_out(capsys, name):
     code, done = leave(capsys, "drives", "validate", str(DRIVES_FOLDER / f"{name}.toml"))
     assert (code, done["outcome"]) == (0, "valid")
     assert f"{done['worked_examples']} worked examples" in done["reason"]
+
+
+def test_validate_boasts_of_no_example_where_there_is_none(capsys):
+    code, done = leave(capsys, "drives", "validate", str(DRIVES_FOLDER / "simulated.toml"))
+    assert (code, done["outcome"], done["worked_examples"]) == (0, "valid", 0)
+    assert "worked" not in done["reason"]
 
 
 def test_validate_names_key_value_and_what_would_be_right(capsys, tmp_path):

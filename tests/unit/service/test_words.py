@@ -15,6 +15,7 @@ from commissioner.procedure.checks import check_name
 from commissioner.procedure.states import ENDED, State
 from commissioner.procedure.tuned import FEWEST
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
+from commissioner.report.run.summary import diagnosis_sentences
 from commissioner.report.sheet.words import NBSP
 from commissioner.run.archive import summary
 from commissioner.service.page.frame import environment, words_of
@@ -69,6 +70,9 @@ def test_what_the_core_remarks_of_every_run_has_its_german():
         "not all of it in the intervals",
         "the tests reached 0.685 Wb; from there to 0.731 Wb, the level that L_M is told for, their own magnetizing curve leads; a "
         "quarter of the way is in L_M's standard error",
+        *diagnosis_sentences({"is_complete": False, "causes": (), "moved": ()}, {}),
+        "Not finished: the time allowed was over before every cause was tried and weighed.",
+        "The time allowed was over before every cause was tried: diagnose the recording again without a limit.",
     )  # fmt: skip
     assert [remark for remark in remarks if not german.knows(remark)] == []
 

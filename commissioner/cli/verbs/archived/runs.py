@@ -132,7 +132,7 @@ def export_run(folder: Path, name: str, out: Path, form: str, *, as_json: bool, 
         if as_json:
             screen.emit(model)
         else:
-            screen.out.print(f"{model.form}: {screen.text(model.model)}", soft_wrap=True)
+            screen.out.print(f"parameters as {model.form} in {screen.text(model.model)}", soft_wrap=True)
         return
     from commissioner.operations import archive
 
