@@ -9,7 +9,7 @@ from pathlib import Path
 
 from commissioner.encoding import HIDDEN
 from commissioner.errors import CheckFailed, ErrorDocument
-from commissioner.motor.nameplate import Nameplate, plate_doubt, prior
+from commissioner.motor.nameplate import Nameplate, plate_doubts, prior
 from commissioner.procedure.checks import CheckResult, NotChecked, check_failed
 from commissioner.procedure.plan import BELOW_TRIP, Job, ProcedurePlan
 from commissioner.records import DriveIdentity
@@ -48,7 +48,8 @@ class RunLimits:
 
 @dataclass(frozen=True)
 class Checked:
-    """`outcome` passed | rejected. `error`: the first check that says no. `limits`: None of a drive that cannot energise for us."""
+    """`outcome` passed | rejected. `error`: the first check that says no. `remarks`: what is unusual about the plate, whatever the checks
+    say. `limits`: None of a drive that cannot energise for us."""
 
     outcome: str
     reason: str
@@ -59,6 +60,7 @@ class Checked:
     watchdog: Mapping[str, int | float | str | bool | None]
     checks: tuple[CheckResult, ...]
     not_checked: tuple[NotChecked, ...]
+    remarks: tuple[str, ...]
     limits: RunLimits | None
     nameplate: Nameplate = field(metadata=HIDDEN)
     plan: ProcedurePlan = field(metadata=HIDDEN)
@@ -78,7 +80,7 @@ def check(request: CheckRequest) -> Checked:
     failure = check_failed(seen.checks)
     return Checked(
         outcome="rejected" if failure else "passed",
-        reason=failure.what if failure else _passed(seen, plate_doubt(nameplate)),
+        reason=failure.what if failure else _passed(seen),
         error=failure.as_dict() if failure else None,
         drive=seen.identity,
         nameplate_in_drive=seen.nameplate,
@@ -86,6 +88,7 @@ def check(request: CheckRequest) -> Checked:
         watchdog=seen.watchdog,
         checks=seen.checks,
         not_checked=seen.not_checked,
+        remarks=plate_doubts(nameplate),
         limits=None if seen.job is None else limits_of(seen.job, seen.identity.rated_drive_current_a),
         nameplate=nameplate,
         plan=plan,
@@ -93,14 +96,12 @@ def check(request: CheckRequest) -> Checked:
     )
 
 
-def _passed(seen: Inspection, doubt: str) -> str:
-    """With what is unusual about the plate. Where no register tells which drive answers, the person has to look: a sister type answers alike."""
+def _passed(seen: Inspection) -> str:
+    """Where no register tells which drive answers, the person has to look: a sister type answers alike."""
     left = f"every check that this drive file allows passed, {len(seen.not_checked)} could not be made"
     if any(row.name == WHICH for row in seen.not_checked):
         left += f", among them whether this is a {seen.identity.drive_type}: compare the label"
-    return f"{left if seen.not_checked else 'every check passed'}; nothing was energised or written" + (
-        f"; but {doubt}" if doubt else ""
-    )
+    return f"{left if seen.not_checked else 'every check passed'}; nothing was energised or written"
 
 
 def limits_of(job: Job, rated_drive_current_a: float) -> RunLimits:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.nameplate import Nameplate, believable
 from commissioner.motor.quantities import in_shown_unit
 from commissioner.procedure.verdict import Objection
 from commissioner.records import plain_name
@@ -145,7 +145,7 @@ def _row(
 
 def _box(field: str, plate: Nameplate) -> tuple[float | None, float | None]:
     """What the plate allows of a contract's field."""
-    box = prior(plate)
+    box = believable(plate)
     if field == "rotor_time_constant_s":
         low, high = box.lower, box.upper
         return (

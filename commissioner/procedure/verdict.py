@@ -14,7 +14,7 @@ from commissioner.identify.estimate.held_back import HeldBack
 from commissioner.identify.estimate.turning import turning_doubt
 from commissioner.identify.intake.dc_link import LinkCourse
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
-from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
+from commissioner.motor.nameplate import Nameplate, ParameterBox, believable
 from commissioner.motor.plate_match import PlateMatch, plate_match, sure_mismatch
 from commissioner.motor.quantities import in_shown_unit
 from commissioner.procedure.plan import Acceptance
@@ -126,7 +126,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
     objections = (
         *_held_back(evidence),
         *_another_motor(evidence.combined, plate),
-        *_outside(evidence.combined, prior(plate)),
+        *_outside(evidence.combined, believable(plate)),
         *_turned(evidence, acceptance),
         *_link_moved(evidence, acceptance),
         *_disagreements(evidence, acceptance),

@@ -25,7 +25,7 @@ from typing import Protocol
 from commissioner.errors import CheckFailed, UsageError
 from commissioner.motor.circuit import Gamma as GammaCircuit
 from commissioner.motor.circuit import InverseGamma, from_t_model
-from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.nameplate import Nameplate, believable
 from commissioner.registers.codec import Value, crc16_modbus, encode_item
 from commissioner.registers.profile import DriveProfile, Item
 
@@ -153,7 +153,7 @@ def parameter_limits(profile: DriveProfile, plate: Nameplate) -> dict[str, tuple
 
     An item without a convention has none: what it stands for is not known.
     """
-    box = prior(plate)
+    box = believable(plate)
     sides = zip(box.lower.as_tuple(), box.upper.as_tuple(), strict=True)
     corners = [InverseGamma(*corner) for corner in itertools.product(*sides)]
     order = profile.parameter_names

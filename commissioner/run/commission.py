@@ -15,7 +15,7 @@ from commissioner.link.drive.facts import Action, Intent
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile, reference
 from commissioner.link.wire.url import parse_url, without_secrets
-from commissioner.motor.nameplate import Nameplate, plate_doubt
+from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.energised.excite import warm_up
 from commissioner.procedure.findings import RunEnded, WarmingUp
@@ -188,8 +188,7 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
     result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names_of(order.profile)))
-    if doubt := plate_doubt(order.nameplate):
-        result["remarks"] = [*result["remarks"], doubt]
+    result["remarks"] = [*result["remarks"], *plate_doubts(order.nameplate)]
     write_report(folder, result, findings)
     folder.cover()
     return result

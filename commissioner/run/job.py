@@ -13,7 +13,7 @@ from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.circuit import PARAMETERS
-from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.nameplate import Nameplate, believable
 from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.link_plan import BITS_PER_REGISTER, OVERHEAD_BITS, StreamPace
 from commissioner.procedure.plan import Job, ProcedurePlan
@@ -136,7 +136,7 @@ def bounds(job: Job) -> Bounds:
         test_voltage_v=job.test_voltage_v,
         axis_time_s=job.axis_time_s,
         total_time_s=job.total_time_s,
-        parameters=prior(job.nameplate),
+        parameters=believable(job.nameplate),
     )
 
 

@@ -17,7 +17,7 @@ from commissioner.link.files.drive_file import archived_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
-from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.nameplate import Nameplate, believable
 from commissioner.records import DriveIdentity, ParameterSnapshot, drive_words
 from commissioner.registers.convention import as_in_drive, drive_values, our_values
 from commissioner.registers.profile import DriveProfile
@@ -207,7 +207,7 @@ def _circuit(run: RunSummary) -> InverseGamma:
 def _check_bounds(circuit: InverseGamma, plate: Nameplate) -> None:
     """The same last gate as in a run."""
     facts = SafetyFacts(checks_passed=True, snapshot_taken=True, writing_allowed=True)
-    bounds = Bounds(0.0, 0.0, 0.0, 0.0, 0.0, prior(plate))
+    bounds = Bounds(0.0, 0.0, 0.0, 0.0, 0.0, believable(plate))
     refusal = permit(WriteParameters(circuit, plate), facts, bounds)
     if refusal is not None:
         raise Aborted(

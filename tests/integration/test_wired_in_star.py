@@ -126,3 +126,39 @@ def test_a_second_first_current_is_no_larger_than_the_first_one_permits(tmp_path
     assert run.ended.outcome == "rejected"
     assert "wired in star where the plate says delta" in run.ended.reason
     assert run.station.highest_flux_wb < 1.02 * run.job.flux_limit_wb(0.24)
+
+
+IN_DELTA_NEARLY_LOSSLESS = """extends = "default"
+[machine]
+id = "haumer_132m04"
+stator_resistance_ohm = 0.205
+rotor_resistance_ohm = 0.14048
+leakage_inductance_h = 0.003753
+inductance_h = 0.06333
+saturation_at_rated_flux = 16.37
+[power_stage]
+switching_frequency_hz = 5000.0
+dead_time_s = 5e-8
+threshold_v = 0.024
+dead_time_knee_a = 0.34
+threshold_knee_a = 0.23
+slope_ohm = 0.007
+[sensors]
+full_scale_a = 45.1
+noise_a = 0.028
+offset_a = [0.071, -0.051, 0.034]
+[drive]
+rated_current_a = 18.42
+hardware_current_limit_a = 44.3
+"""
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_levels_that_are_not_apart_leave_the_staircase_its_top(tmp_path, seed):
+    """7.5 kW behind a nearly lossless inverter: both levels were held at 0.33 V, the next ones at nothing, and nothing was said of the wiring."""
+    scenario = tmp_path / "delta.toml"
+    scenario.write_text(IN_DELTA_NEARLY_LOSSLESS, encoding="utf-8")
+    run = commissioned(tmp_path / "runs", Pace(), str(scenario), seed, axes=(0.0,))
+    assert run.ended.outcome == "rejected"
+    assert "wired in delta where the plate says star" in run.ended.reason
+    assert run.station.highest_flux_wb < 0.6 * run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))

@@ -41,3 +41,5 @@ def _show(done: Checked) -> None:
     rows += [("[yellow]–[/]", r.name, "not checked", "", screen.text(r.why)) for r in done.not_checked]
     header, width = ("", "check", "seen", "wanted", "remedy"), 5 if any(row[4] for row in rows) else 4
     screen.out.print(screen.table("", header[:width], [row[:width] for row in rows]))
+    for remark in done.remarks:
+        screen.out.print(f"[yellow]•[/] {screen.text(remark)}")

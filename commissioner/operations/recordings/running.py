@@ -14,7 +14,7 @@ from commissioner.diagnose.search.journal import Said
 from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, DataRefused
 from commissioner.identify.contract import RunningDocument
-from commissioner.motor.nameplate import Nameplate, plate_doubt
+from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.operations.events import GoOn, Observe
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
@@ -68,7 +68,7 @@ def diagnosed(
     document = as_document(seen)
     document["remarks"] = [
         *(f"{Path(r.source).name}: {n.what}." for r in recordings for n in r.notes),
-        *_of_plate(plate),
+        *plate_doubts(plate),
         *document["remarks"],
     ]
     if out is not None:
@@ -95,7 +95,7 @@ def identified(tables: Sequence[Table], motor: str | None, out: Path | None = No
     recordings, plate = readable(tables, motor, "identify")
     found = identify(recordings, plate)
     document = cast("RunningDocument", plain(as_document(found)))
-    document["remarks"] = [*_of_plate(plate), *document["remarks"]]
+    document["remarks"] = [*plate_doubts(plate), *document["remarks"]]
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.identified import page_of
@@ -103,11 +103,6 @@ def identified(tables: Sequence[Table], motor: str | None, out: Path | None = No
         text = render(page_of(found, document, ", ".join(Path(t.source).name for t in tables)))
         write_texts(out, {"report.html": text, "identification.json": json.dumps(document, indent=2)})
     return document
-
-
-def _of_plate(plate: Nameplate) -> list[str]:
-    said = plate_doubt(plate)
-    return [said] if said else []
 
 
 def is_running_model(document: Mapping[str, Any]) -> bool:

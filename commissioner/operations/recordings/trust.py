@@ -7,7 +7,7 @@ from typing import Literal, cast
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, plate_doubt
+from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, doubt, rated_point
 from commissioner.records import Signal, StandstillRecording
 
@@ -49,7 +49,7 @@ def judged(circuit: InverseGamma, plate: Nameplate, trust: Trust | None) -> list
 
 def doubts(rated: OperatingPoint, plate: Nameplate) -> list[str]:
     """What is unusual about the plate itself, and beside what a circuit draws at its rated point; a sentence each."""
-    return [said for said in (plate_doubt(plate), doubt(rated, plate)) if said]
+    return [said for said in (*plate_doubts(plate), doubt(rated, plate)) if said]
 
 
 def trusted_plate(factor: float) -> str:

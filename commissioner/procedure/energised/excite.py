@@ -12,7 +12,7 @@ from commissioner.identify.excite import tones as excitation
 from commissioner.identify.excite.flux_guard import FluxAdvice
 from commissioner.identify.excite.tones import DesignedExcitation, ExcitationLimits
 from commissioner.motor.circuit import SYMBOLS, InverseGamma
-from commissioner.motor.nameplate import ParameterBox, prior
+from commissioner.motor.nameplate import ParameterBox, believable
 from commissioner.motor.plate_match import PlateMismatch, sure_mismatch
 from commissioner.procedure.assembly import assemble
 from commissioner.procedure.energised.captured import captured
@@ -118,7 +118,7 @@ def _look(job: Job, findings: Findings) -> Generator[Command, Any, None]:
     except DataRefused:
         return
     findings.look = look
-    findings.estimate = _believable(look, plate_machine(job, findings), prior(job.nameplate))
+    findings.estimate = _believable(look, plate_machine(job, findings), believable(job.nameplate))
     findings.is_measured = findings.estimate == look.parameters
     error = look.inverter.plateau_v if look.inverter else 0.0
     yield Tell(FirstLook(look.parameters.as_tuple(), look.std, error, look.delay_s[0]))

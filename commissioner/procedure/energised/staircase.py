@@ -66,6 +66,10 @@ KNEE_STEP, KNEE_TOP, KNEE_LAG = 0.02, 0.3, 0.1
 """Points kept from the climb: their distance and how far up, of the top current, and the largest share of flux lag."""
 SETTLED = 0.006
 FIRST_SETTLED = 0.012
+APART = 1.2
+"""Current of one level over that of the next, of rungs that are a factor of two apart, from which on the step between them tells an
+inductance. Of a motor wired in delta for star behind a nearly ideal inverter both were held at 0.33 V: the step's flux over no step of current
+left the top at 0.02 A, and the staircase was refused for too few levels, with no word of the wiring."""
 FAST_TIMES = 4.0
 PUSH, ARRIVAL = 4.0, 0.85
 """First surplus of a push towards the next level, in resistive steps; it falls to nothing while the flux gets that far."""
@@ -250,9 +254,12 @@ class _Stair(DirectCurrent):
         return float(np.interp(rung * self._top_a, self._reached, self._steady))
 
     def tighten(self) -> None:
-        """The inductance between the two levels held last says how high the top may be."""
+        """The inductance between the two levels held last says how high the top may be, where they are apart."""
         period = period_s(self.findings)
         larger, smaller = self._whole[-2:]
+        headings_a = self._heading().current_a[-2:]
+        if abs(headings_a[0]) < APART * abs(headings_a[1]):
+            return
         inductance_h = stepped_inductance_h(larger, smaller, self._heading(), period)
         self._top_a = min(self._top_a, TOP * self._limit_wb / max(resistance.SEEN_DOUBT * inductance_h, 1e-9))
 

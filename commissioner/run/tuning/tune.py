@@ -29,7 +29,7 @@ from commissioner.link.drive.ordinary.tuning import REST, Operator, Tuned
 from commissioner.link.drive.write_back import check_can_be_given_back
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
-from commissioner.motor.nameplate import Nameplate, plate_doubt
+from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.procedure.checks import check_failed, judge_idle
 from commissioner.procedure.findings import DriveIdentified, RunEnded
 from commissioner.procedure.plan import ProcedurePlan
@@ -476,8 +476,7 @@ def _save(order: Order, folder: RunFolder, found: TuneFindings, ended: RunEnded)
         in_the_drive=found.in_the_drive,
     )
     document["objections"] = found.verdict.objections if found.verdict else ()
-    doubt = plate_doubt(order.nameplate)
-    document["remarks"] = [f"tuning: {tuning.proof}", *found.remarks, *([doubt] if doubt else [])]
+    document["remarks"] = [*plate_doubts(order.nameplate), f"tuning: {tuning.proof}", *found.remarks]
     result = plain(document)
     write_report(folder, result, found.common)
     folder.cover()

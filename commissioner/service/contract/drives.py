@@ -88,8 +88,8 @@ class RunLimitsDocument(TypedDict):
 
 
 class CheckDocument(TypedDict):
-    """`check`. `outcome`: passed | rejected. `error`: the first check that says no. `limits`: null of a drive that cannot energise for us. `nameplate_in_drive` and
-    `parameters_in_drive` by the drive file's names and in its units."""
+    """`check`. `outcome`: passed | rejected. `error`: the first check that says no. `remarks`: what is unusual about the plate. `limits`: null of a drive that
+    cannot energise for us. `nameplate_in_drive` and `parameters_in_drive` by the drive file's names and in its units."""
 
     outcome: str
     reason: str
@@ -100,6 +100,7 @@ class CheckDocument(TypedDict):
     watchdog: dict[str, float | str | bool | None]
     checks: list[CheckRow]
     not_checked: list[UncheckedRow]
+    remarks: list[str]
     limits: RunLimitsDocument | None
 
 

@@ -9,9 +9,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Form, Request, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Depends, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict
+from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, HTTPConnection
 
 from commissioner.encoding import JsonObject, read_json
@@ -56,6 +57,18 @@ async def _why(request: Request) -> str:
 
 
 Why = Annotated[str, Depends(_why)]
+
+
+async def _target(request: Request) -> tuple[str, str]:
+    """Run and drive that a form names; both empty, which stops everything, where it does not come whole or cannot be read."""
+    with contextlib.suppress(ValueError, HTTPException, ClientDisconnect, TimeoutError):
+        form = await asyncio.wait_for(request.form(), WORDS_S)
+        run, drive = (str(form.get(name) or "") for name in ("run", "drive"))
+        return run[:200], drive[:60]
+    return "", ""
+
+
+Target = Annotated[tuple[str, str], Depends(_target)]
 
 
 class ControlWish(BaseModel):
@@ -113,11 +126,9 @@ async def stop_everything(request: Request, why: Why) -> StopsDocument:
 
 
 @router.post("/stop", include_in_schema=False)
-async def stop_by_form(
-    request: Request, run: Annotated[str, Form(max_length=200)] = "", drive: Annotated[str, Form(max_length=60)] = ""
-) -> Response:
+async def stop_by_form(request: Request, target: Target) -> Response:
     """The same from a page without script; back to where it came from."""
-    await stop_runs(request, "", "form", run, drive)
+    await stop_runs(request, "", "form", *target)
     back = split_address(request.headers.get("referer", "/")).path or "/"
     return RedirectResponse(back if back.startswith("/") and not back.startswith("//") else "/", 303)
 

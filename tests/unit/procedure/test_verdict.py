@@ -182,3 +182,12 @@ def test_a_link_that_stood_still_or_was_not_seen_is_no_objection(lowest_v):
     """By less than R_s may be uncertain: half of 9 V in 535 V is 0.8 %."""
     assert objections(LinkCourse(lowest_v, 540.0, (540.0, lowest_v)), VALUES, VALUES) == []
     assert objections(None, VALUES, VALUES) == []
+
+
+@pytest.mark.parametrize(("of_largest", "decision"), [(1.15, Decision.KEEP), (1.25, Decision.REJECT)])
+def test_iron_that_a_small_test_does_not_saturate_is_the_plates_own(of_largest, decision):
+    """The box holds at rated flux; an honest 18.5 kW motor tested at 0.6 of the flux limit showed 1.055 of its largest L_M and was refused."""
+    most_h = prior(PLATE).upper.magnetizing_inductance_h
+    values = {**VALUES, "magnetizing_inductance_h": Quantity(of_largest * most_h, 0.001 * most_h)}
+    verdict = decide(Evidence(values, ((0.0, values),)), PLATE, ACCEPTANCE, write_back=False)
+    assert verdict.decision is decision, verdict.reason
