@@ -42,6 +42,7 @@ from commissioner.recordings.reading.mend import (
     with_whole_time,
     without_doubled_rows,
     without_empty_columns,
+    without_infinite,
     without_untimed_rows,
 )
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_said, units_said
@@ -275,6 +276,7 @@ def _table(
     if is_sheet(r.name for r in found.readings):
         metadata = {**windings_said(metadata, source), **metadata}
     columns, shorter = _of_one_length(found.columns)
+    columns, infinite = without_infinite(columns)
     period = metadata.get("sample_period_s")
     if clock.interval_s is None and isinstance(period, float):
         clock = replace(clock, interval_s=period, said_by="sample_period_s")
@@ -289,7 +291,7 @@ def _table(
         columns,
         metadata,
         source,
-        (*notes, *of_plate, *found.notes, *shorter, *timed, *phases, *along, *unnamed),
+        (*notes, *of_plate, *found.notes, *shorter, *infinite, *timed, *phases, *along, *unnamed),
         found.readings,
     )
 

@@ -121,7 +121,7 @@ def diagnose(
         return Diagnosis("refused", f"{refusal.what}; {refusal.remedy}", refusal=refusal)
     except TimeOver:
         return Diagnosis(*UNFINISHED, record=record, remarks=(*record.remarks, NO_LIMIT))
-    return _conclude(record, found)
+    return _conclude(found.problem.record, found)  # as it was read: means of an inverter's voltage, or held
 
 
 def _conclude(record: Record, found: Found) -> Diagnosis:

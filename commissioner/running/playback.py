@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.estimation.fit import Machine, Problem, columns_of, plain_machine, problem_of, refine, simulate
+from commissioner.estimation.held import best_reading
 from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import Scales
 from commissioner.estimation.record import Record, Window, between, prepare
@@ -46,13 +47,15 @@ def play(
 
 def _beside(machine: Machine, like: RunningRecording, plate: Nameplate) -> tuple[Machine, Problem]:
     """On the recording's first window, with what is its own and not the motor's fitted to its currents: fluxes (and a speed that is not
-    measured) at its first sample, which comes up to a sample after the contactor closed, and the encoder's ripple."""
+    measured) at its first sample, which comes up to a sample after the contactor closed, and the encoder's ripple. An inverter's voltage is read
+    between rows as it fits best, as a fit reads it."""
     record = prepare([like], plate)
     record = replace(record, windows=record.windows[:1])
     problem = problem_of(record, 0.0)
     began = plain_machine(machine.physical()[:4].tolist(), record, has_shaft=not record.has_speed)
     machine = replace(began, theta=machine.theta)
     columns = columns_of(RIPPLE if record.has_speed else (), record, machine)
+    problem, _ = best_reading(problem, refine(problem, machine, columns, is_final=False))
     return refine(problem, machine, columns, is_final=False).machine, problem
 
 

@@ -19,7 +19,7 @@ from commissioner.estimation.fit import (
     refine,
     refreshed,
 )
-from commissioner.estimation.noisy_input import unbiased, with_noise_of
+from commissioner.estimation.noisy_input import chi2_by_own_noise, unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record
 from commissioner.running.causes import CATALOGUE, always_tied
@@ -404,7 +404,18 @@ def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[
     worse = other.held - held.held
     if worse / max(held.held / max(held.held_count, 1), 1.0) > RULES.hold_out_loss + 0.01 * gain:
         return WORSE
-    return ""
+    return "" if _gains_by_own_noise(seeking, fit, other, causes[-1]) else OF_NOISE
+
+
+def _gains_by_own_noise(seeking: Search, fit: Fit, other: Fit, one: Named) -> bool:
+    """Whether the cause gains what a name asks for where each machine is weighted by the noise that it leaves itself.
+
+    Under one load with 0.24 % of noise a healthy motor had a stator asymmetry of 3.0 +- 0.9 %: from a chi-square of 1.017 a sample, six times
+    the true R_s gained 2701 by passing less of that noise; by each one's own nothing was gained.
+    """
+    before, after = (chi2_by_own_noise(seeking.problem, f.machine) for f in (fit, other))
+    gain, scale = before - after, max(after / fit.count, 1.0)
+    return gain / scale >= _needed(seeking, one) and gain >= least_strength(seeking.problem.record) ** 2 * fit.count
 
 
 def _exchanged(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]]:

@@ -93,8 +93,8 @@ def dominant_frequency_hz(vector: Vector, sample_period_s: float) -> float:
 
 
 def follow_supply(voltage: Vector, sample_period_s: float, frequency_hz: float) -> SupplyAngle:
-    """The angle of the positive-sequence voltage: means over whole supply periods, phase unwrapped, stiff spline."""
-    step = max(1, round(1 / (frequency_hz * sample_period_s)))
+    """The angle of the positive-sequence voltage: means over whole supply periods, phase unwrapped, stiff spline; of a single period its phase."""
+    step = min(max(1, round(1 / (frequency_hz * sample_period_s))), voltage.size)
     blocks = voltage.size // step
     carrier = 2 * np.pi * frequency_hz
     time = np.arange(blocks * step) * sample_period_s
@@ -103,8 +103,8 @@ def follow_supply(voltage: Vector, sample_period_s: float, frequency_hz: float) 
     phase = np.unwrap(np.angle(mean))
     centre = (np.arange(blocks) * step + 0.5 * (step - 1)) * sample_period_s
     end = (voltage.size - 1) * sample_period_s
-    pieces = max(1, int(end / KNOT_SPACING_S))
-    order = 3 if blocks >= 4 * (pieces + 3) else 1
+    pieces = max(1, min(int(end / KNOT_SPACING_S), blocks - 1))
+    order = 3 if blocks >= 4 * (pieces + 3) else min(blocks - 1, 1)
     inner = np.linspace(0.0, end, pieces + 1)[1:-1]
     knots = np.concatenate([np.zeros(order + 1), inner, np.full(order + 1, end)])
     return SupplyAngle(carrier, make_lsq_spline(centre, phase, knots, k=order))

@@ -24,6 +24,9 @@ from commissioner.records import RunningRecording
 from commissioner.running.diagnosis import Diagnosis
 from commissioner.running.search import Step
 
+CARRIER = "switching_frequency_hz"
+"""Of the inverter, whose rows' voltages are read by it: what is played by them is to be read so as well."""
+
 
 def readable(tables: Sequence[Table], motor: str | None, step: str) -> tuple[list[RunningRecording], Nameplate]:
     """The tables as recordings of one motor. DataRefused where a table is not of a running motor, or of another one."""
@@ -66,11 +69,7 @@ def diagnosed(
 
     seen = diagnose(recordings, plate, excluded=excluded, observe=say, go_on=go_on)
     document = as_document(seen)
-    document["remarks"] = [
-        *(f"{Path(r.source).name}: {n.what}." for r in recordings for n in r.notes),
-        *plate_doubts(plate),
-        *document["remarks"],
-    ]
+    document["remarks"] = [*_of_reading(recordings), *plate_doubts(plate), *document["remarks"]]
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.page import page_of
@@ -95,7 +94,7 @@ def identified(tables: Sequence[Table], motor: str | None, out: Path | None = No
     recordings, plate = readable(tables, motor, "identify")
     found = identify(recordings, plate)
     document = cast("RunningDocument", plain(as_document(found)))
-    document["remarks"] = [*plate_doubts(plate), *document["remarks"]]
+    document["remarks"] = [*_of_reading(recordings), *plate_doubts(plate), *document["remarks"]]
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.identified import page_of
@@ -103,6 +102,11 @@ def identified(tables: Sequence[Table], motor: str | None, out: Path | None = No
         text = render(page_of(found, document, ", ".join(Path(t.source).name for t in tables)))
         write_texts(out, {"report.html": text, "identification.json": json.dumps(document, indent=2)})
     return document
+
+
+def _of_reading(recordings: Sequence[RunningRecording]) -> list[str]:
+    """What was taken for something else, or left out, when the files were read."""
+    return [f"{Path(r.source).name}: {n.what}." for r in recordings for n in r.notes]
 
 
 def is_running_model(document: Mapping[str, Any]) -> bool:
@@ -134,5 +138,7 @@ def played(
             file=source, key="numbers", value="currents that run away", expected="numbers of a motor"
         )
     keys = {k: v for k, v in document["nameplate"].items() if isinstance(v, int | float | str)}
+    if recording is not None and (carrier := recording.metadata.get(CARRIER)):
+        keys[CARRIER] = carrier
     write_table(out, columns, {**keys, "sample_period_s": period})
     return int(columns["time_s"].size), () if is_plain else tuple(document["effects"])

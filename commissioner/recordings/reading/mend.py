@@ -79,6 +79,15 @@ def require_stamps(columns: Mapping[str, Signal], source: str) -> None:
         )  # fmt: skip
 
 
+def without_infinite(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns with NaN, a missing sample, for what is infinite: a division by zero on the way, an overflow of a channel."""
+    many = sum(int(np.isinf(v).sum()) for v in columns.values())
+    if not many:
+        return dict(columns), []
+    note = ReadingNote("infinite", f"{many} infinite numbers are no samples: taken as missing")
+    return {name: np.where(np.isinf(v), np.nan, v) for name, v in columns.items()}, [note]
+
+
 def without_untimed_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
     """The columns without rows whose time is none: statistics below the samples, header lines, lost stamps."""
     time = columns.get("time_s")

@@ -191,3 +191,15 @@ def test_parameters_of_currents_alone_are_refused_for_want_of_voltages(tmp_path,
     with pytest.raises(DataRefused, match="holds no voltages") as refused:
         to_standstill(contract_table(written(tmp_path, [names, *lines])))
     assert re.search(told, str(refused.value.value))
+
+
+@pytest.mark.parametrize("said", ["inf", "-inf"])
+def test_an_infinite_number_is_a_missing_sample_and_is_said(tmp_path, said):
+    """It went on as 1.8e308 A: numpy's warnings on the screen, and a state of `nan A`."""
+    body = rows()
+    cells = body[100].split(",")
+    body[100] = ",".join([cells[0], said, *cells[2:]])
+    header = "time_s,current_u_a,current_v_a,current_w_a,voltage_u_v,voltage_v_v,voltage_w_v"
+    recording = read_running(written(tmp_path, [header, *body]))
+    assert "infinite" in {note.code for note in recording.notes} and np.isnan(recording.currents_a[0][100])
+    assert np.isfinite(np.delete(recording.currents_a[0], 100)).all()
