@@ -14,8 +14,9 @@ from commissioner.diagnose.search.journal import Said
 from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, DataRefused
 from commissioner.identify.contract import RunningDocument
-from commissioner.motor.nameplate import Nameplate, plate_doubts
+from commissioner.motor.nameplate import Nameplate
 from commissioner.operations.events import GoOn, Observe
+from commissioner.operations.recordings.trust import unlike_plate
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
 from commissioner.recordings.table import Table, to_running, write_table
@@ -69,7 +70,7 @@ def diagnosed(
 
     seen = diagnose(recordings, plate, excluded=excluded, observe=say, go_on=go_on)
     document = as_document(seen)
-    document["remarks"] = [*_of_reading(recordings), *plate_doubts(plate), *document["remarks"]]
+    document["remarks"] = [*_of_reading(recordings), *unlike_plate(seen.parameters_after, plate), *document["remarks"]]
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.page import page_of
@@ -94,7 +95,7 @@ def identified(tables: Sequence[Table], motor: str | None, out: Path | None = No
     recordings, plate = readable(tables, motor, "identify")
     found = identify(recordings, plate)
     document = cast("RunningDocument", plain(as_document(found)))
-    document["remarks"] = [*_of_reading(recordings), *plate_doubts(plate), *document["remarks"]]
+    document["remarks"] = [*_of_reading(recordings), *unlike_plate(found.parameters, plate), *document["remarks"]]
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.identified import page_of

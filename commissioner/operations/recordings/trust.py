@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, replace
 from typing import Literal, cast
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, doubt, rated_point
 from commissioner.records import Signal, StandstillRecording
 
 Trust = Literal["plate", "data"]
+TOLD = 0.1
+"""Relative standard error of each of the four up to which a running motor's are compared with its plate."""
 
 
 def trust_from(said: str | None) -> Trust | None:
@@ -50,6 +53,22 @@ def judged(circuit: InverseGamma, plate: Nameplate, trust: Trust | None) -> list
 def doubts(rated: OperatingPoint, plate: Nameplate) -> list[str]:
     """What is unusual about the plate itself, and beside what a circuit draws at its rated point; a sentence each."""
     return [said for said in (*plate_doubts(plate), doubt(rated, plate)) if said]
+
+
+def unlike_plate(values: Mapping[str, Quantity], plate: Nameplate) -> list[str]:
+    """What a running motor's four parameters say against the plate, a sentence each, where the recording tells all of them."""
+    names = [one.name for one in fields(InverseGamma)]
+    four = [values[name] for name in names if name in values]
+    if len(four) < len(names) or not all(q.std < TOLD * q.value for q in four):
+        return list(plate_doubts(plate))
+    rated = rated_point(InverseGamma(*(q.value for q in four)), plate)
+    against = contradiction(rated, plate)
+    if against is None:
+        return doubts(rated, plate)
+    return [
+        f"{against.what} ({against.value}; {against.limit}): check the scales of currents and voltages, whether the voltages are those between "
+        "lines, and that the plate is this motor's, in its connection"
+    ]
 
 
 def trusted_plate(factor: float) -> str:

@@ -18,7 +18,7 @@ from commissioner.monitor.loads.mean_torque import whole_record_torque
 from commissioner.monitor.periods import combs
 from commissioner.monitor.periods.periods import SHAFT_SIGNIFICANT, find_peaks_above, pair_spectrum, stands_out
 from commissioner.monitor.periods.steadiness import frequency_wander, too_little
-from commissioner.monitor.signals.supply import TurningFrame
+from commissioner.monitor.signals.supply import TurningFrame, follow_supply
 from commissioner.monitor.signals.tracking import Demodulated, track
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
@@ -361,3 +361,15 @@ def test_what_a_shorted_loop_takes_is_in_the_torques_error(loop: float) -> None:
 @pytest.mark.parametrize("unbalance", [0.0, 0.02, 0.05])
 def test_what_the_mains_unbalance_drives_is_no_loop(unbalance: float) -> None:
     assert lost_in_loop_w(terminals(0.0, unbalance)[0], LARGE) == 0.0
+
+
+ONE_S, HZ = 2e-4, 50.0
+
+
+@pytest.mark.parametrize("samples", [64, 100, 199, 200, 1000])
+def test_the_supply_of_a_period_or_less_is_followed(samples):
+    """100 samples at 5 kHz ended in a defect: a spline asks for two means."""
+    time = np.arange(samples) * ONE_S
+    supply = follow_supply(325.0 * np.exp(2j * np.pi * HZ * time), ONE_S, HZ)
+    np.testing.assert_allclose(np.exp(1j * supply.angle_rad(time)), np.exp(2j * np.pi * HZ * time), atol=1e-6)
+    np.testing.assert_allclose(supply.frequency_rad_per_s(time), 2.0 * np.pi * HZ, rtol=1e-6)
