@@ -48,6 +48,8 @@ MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
+CARRIER = "switching_frequency_hz"
+"""Of the inverter, whose rows' voltages are read by it: what is played by them is to be read so as well."""
 RENEWALS, RENEWED_TO = (1, 2), 0.02
 """Rows a carrier period where each has its own voltage, which an inverter renews once or twice a period; how near to that."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
@@ -234,11 +236,11 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
 
 def _carrier_hz(one: RunningRecording) -> float:
     """Of an inverter that feeds the motor; 0 where the recording names none. DataRefused: what it names is no frequency."""
-    named = one.metadata.get("switching_frequency_hz") or 0.0
+    named = one.metadata.get(CARRIER) or 0.0
     if isinstance(named, int | float) and 0.0 <= named < np.inf:
         return float(named)
     raise _refused(
-        f"{one.source}: switching_frequency_hz is no frequency", named, "a number of Hz, 0 or none on the mains",
+        f"{one.source}: {CARRIER} is no frequency", named, "a number of Hz, 0 or none on the mains",
         "write the inverter's carrier frequency in Hz, or leave the line out",
     )  # fmt: skip
 

@@ -42,6 +42,16 @@ class Nameplate:
         return 1.0 - self.rated_speed_rpm * self.pole_pairs / (60.0 * self.rated_frequency_hz)
 
     @property
+    def rated_input_w(self) -> float:
+        """Electrical, at rated load: sqrt(3) U I cos(phi)."""
+        return math.sqrt(3.0) * self.rated_voltage_v * self.rated_current_a * self.power_factor
+
+    @property
+    def efficiency(self) -> float:
+        """Shaft power over electrical power at rated load."""
+        return self.rated_power_w / self.rated_input_w
+
+    @property
     def run_up_s(self) -> float | None:
         """From standstill to rated speed at rated torque, J n^2 / P: what a moment of inertia in a wrong unit makes absurd."""
         speed_rad_per_s = 2.0 * math.pi * self.rated_speed_rpm / 60.0
@@ -240,30 +250,31 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
                 else ""
             ),
         )
-    input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
-    efficiency = plate.rated_power_w / input_w
+    input_w, efficiency = plate.rated_input_w, plate.efficiency
     least, best = efficiency_range(plate.rated_power_w, plate.pole_pairs)
     if not least < efficiency < best:
         yield PlateProblem(
             "rated_power_w",
             plate.rated_power_w,
             f"{least:.2g} ... {best:.3g} times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate, as "
-            f"motors of this power have (it is {efficiency:.3g}){_of_two_lines(plate, efficiency)}; of a plate with two "
-            "voltages, voltage and current of the same connection; of powers, the one at the shaft"
-            + _as_peak(plate, efficiency),
+            f"motors of this power have (it is {efficiency:.3g}){_other_readings(plate)}; of a plate with two "
+            "voltages, voltage and current of the same connection; of powers, the one at the shaft" + _as_peak(plate),
         )
 
 
 BETWEEN_LINES = (math.sqrt(3.0), 2.0)
 """Between two readings of one plate: 230/400 V, star or delta, and 230/460 V, halves of a winding in parallel or in series."""
-
-
 KW_PER_HP = 0.7457
 
 
-def _of_two_lines(plate: Nameplate, efficiency: float) -> str:
+def _over_typical(plate: Nameplate) -> float:
+    """Its efficiency over that of a typical motor."""
+    return plate.efficiency / typical_efficiency(plate.rated_power_w, plate.pole_pairs)
+
+
+def _other_readings(plate: Nameplate) -> str:
     """The two readings that would fit where voltage and current are of different connections; or the power, where hp were taken for kW."""
-    off = efficiency / typical_efficiency(plate.rated_power_w, plate.pole_pairs)
+    off = _over_typical(plate)
     if 1.0 < off < math.sqrt(BETWEEN_LINES[0] / KW_PER_HP):
         return f": {KW_PER_HP * plate.rated_power_w:.4g} W would fit, a number of hp taken for kW"
     up = min((k if off < 1.0 else 1.0 / k for k in BETWEEN_LINES), key=lambda k: abs(math.log(k * off)))
@@ -275,12 +286,9 @@ def _of_two_lines(plate: Nameplate, efficiency: float) -> str:
     )
 
 
-def _as_peak(plate: Nameplate, efficiency: float) -> str:
+def _as_peak(plate: Nameplate) -> str:
     """The rms value of a current that is its peak where that fits."""
-    rms_a, off = (
-        plate.rated_current_a / math.sqrt(2.0),
-        efficiency / typical_efficiency(plate.rated_power_w, plate.pole_pairs),
-    )
+    rms_a, off = plate.rated_current_a / math.sqrt(2.0), _over_typical(plate)
     fits = off < 1.0 and LEAST_OF_TYPICAL < math.sqrt(2.0) * off < 1.0 / LEAST_OF_TYPICAL
     return f"; {rms_a:.3g} A would fit, too, a peak value taken for an rms one" if fits else ""
 
@@ -303,15 +311,12 @@ def plate_doubts(plate: Nameplate) -> tuple[str, ...]:
 
 
 def _lossy(plate: Nameplate) -> str:
-    efficiency = plate.rated_power_w / (
-        math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
-    )
     typical = typical_efficiency(plate.rated_power_w, plate.pole_pairs)
     least = 1.0 - MOST_LOSSES * (1.0 - typical)
-    if efficiency >= least:
+    if plate.efficiency >= least:
         return ""
     return (
-        f"the plate means an efficiency of {efficiency:.3g}, where motors of {plate.rated_power_w:.4g} W have {least:.2g} or more: read power, "
+        f"the plate means an efficiency of {plate.efficiency:.3g}, where motors of {plate.rated_power_w:.4g} W have {least:.2g} or more: read power, "
         f"voltage, current and power factor again ({plate.rated_power_w / KW_PER_HP:.4g} W would fit, a number of kW taken for hp, or "
         f"{plate.rated_current_a / math.sqrt(2.0):.3g} A, a peak value taken for an rms one)"
     )

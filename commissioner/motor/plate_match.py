@@ -70,13 +70,12 @@ class PlateMismatch:
 def plate_match(machine: InverseGamma, plate: Nameplate) -> PlateMatch:
     impedance = stator_impedance(equal_leakages(machine), plate.rated_frequency_rad_per_s, plate.rated_slip)
     current_a = plate.rated_voltage_v / math.sqrt(3.0) / abs(impedance)
-    input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
     copper_w = 3.0 * machine.stator_resistance_ohm * plate.rated_current_a**2
     typical = prior(plate).typical
     ratios = [a / b for a, b in zip(machine.as_tuple(), typical.as_tuple(), strict=True)]
     return PlateMatch(
         current_a / plate.rated_current_a,
-        copper_w / max(input_w - plate.rated_power_w, 1e-9),
+        copper_w / max(plate.rated_input_w - plate.rated_power_w, 1e-9),
         math.prod(ratios) ** 0.25,
     )
 

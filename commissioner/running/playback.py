@@ -55,8 +55,8 @@ def _beside(machine: Machine, like: RunningRecording, plate: Nameplate) -> tuple
     began = plain_machine(machine.physical()[:4].tolist(), record, has_shaft=not record.has_speed)
     machine = replace(began, theta=machine.theta)
     columns = columns_of(RIPPLE if record.has_speed else (), record, machine)
-    problem, _ = best_reading(problem, refine(problem, machine, columns, is_final=False))
-    return refine(problem, machine, columns, is_final=False).machine, problem
+    problem, fit = best_reading(problem, refine(problem, machine, columns, is_final=False))
+    return fit.machine, problem
 
 
 def _on_mains(

@@ -188,16 +188,11 @@ def judge_plate(values: Mapping[str, Any]) -> JudgedPlate:
             "what": "contradicts the rest of the plate",
             "remedy": contradiction.expected,
         }
-    efficiency = efficiency_of(plate)
+    efficiency = plate.efficiency
     return {
         "ok": all(field["ok"] for field in fields.values()), "fields": fields, "efficiency": round(efficiency, 4),
         "usual_efficiency": usual_efficiency(plate), "slip": round(plate.rated_slip, 5), "questions": questions(plate),
     }  # fmt: skip
-
-
-def efficiency_of(plate: Nameplate) -> float:
-    """Shaft power over electrical power at rated load."""
-    return plate.rated_power_w / (math.sqrt(3) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor)
 
 
 def usual_efficiency(plate: Nameplate) -> tuple[float, float]:
@@ -214,7 +209,7 @@ def questions(plate: Nameplate) -> list[str]:
 
 def _of_efficiency(plate: Nameplate) -> list[str]:
     low, high = usual_efficiency(plate)
-    efficiency = efficiency_of(plate)
+    efficiency = plate.efficiency
     if low <= efficiency <= high and not plate_doubt(plate):
         return []
     if low <= efficiency * math.sqrt(3) <= high:

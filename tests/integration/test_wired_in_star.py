@@ -1,5 +1,5 @@
 """A motor wired in star whose plate says delta: three times the impedances. Small direct currents say so before the flux gets anywhere,
-also behind an inverter that loses much."""
+also behind an inverter that loses much. And in delta whose plate says star: the first tones say so before the drive trips."""
 
 import pytest
 
@@ -24,12 +24,17 @@ threshold_v = 1.6
 """A leg loses 21 V."""
 
 
+def one_axis(folder, scenario, seed, connection="star"):
+    """The scenario's motor commissioned along one axis, by a plate of this connection."""
+    file = folder / "scenario.toml"
+    file.write_text(scenario, encoding="utf-8")
+    return commissioned(folder / "runs", Pace(), str(file), seed, axes=(0.0,), connection=connection)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_it_is_named_by_the_first_small_current_and_the_true_flux_stays_under_its_limit(tmp_path, seed):
     """Levels held for a quarter of a second were once taken as settled: 1.4 times the inductance seen, 1.9 of the limit reached."""
-    scenario = tmp_path / "star.toml"
-    scenario.write_text(SCENARIO, encoding="utf-8")
-    run = commissioned(tmp_path / "runs", Pace(), str(scenario), seed, axes=(0.0,), connection="delta")
+    run = one_axis(tmp_path, SCENARIO, seed, connection="delta")
     assert run.ended.outcome == "rejected"
     assert "wired in star where the plate says delta" in run.ended.reason
     assert run.station.highest_flux_wb < 0.6 * run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))
@@ -38,9 +43,7 @@ def test_it_is_named_by_the_first_small_current_and_the_true_flux_stays_under_it
 
 
 def test_it_is_named_behind_an_inverter_that_loses_much(tmp_path):
-    scenario = tmp_path / "star.toml"
-    scenario.write_text(SCENARIO + LOSSY, encoding="utf-8")
-    run = commissioned(tmp_path / "runs", Pace(), str(scenario), 2, axes=(0.0,), connection="delta")
+    run = one_axis(tmp_path, SCENARIO + LOSSY, 2, connection="delta")
     assert run.ended.outcome == "rejected"
     assert "wired in star where the plate says delta" in run.ended.reason
     assert run.station.highest_flux_wb < 0.6 * run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))
@@ -48,9 +51,7 @@ def test_it_is_named_behind_an_inverter_that_loses_much(tmp_path):
 
 def test_a_first_current_that_told_too_little_is_followed_by_a_larger_one(tmp_path):
     """The small one alone said 0.14 +- 0.07 H of a 15 kW motor's 0.07 H, which left too little current to tell its resistance."""
-    scenario = tmp_path / "lossy.toml"
-    scenario.write_text('extends = "default"\n' + LOSSY, encoding="utf-8")
-    run = commissioned(tmp_path / "runs", Pace(), str(scenario), 1, axes=(0.0,))
+    run = one_axis(tmp_path, 'extends = "default"\n' + LOSSY, 1)
     assert run.ended.outcome == "commissioned"
     seen = run.findings.first_current
     assert seen.stator_inductance_h == pytest.approx(0.32, abs=3 * seen.stator_inductance_std_h)
@@ -85,9 +86,7 @@ hardware_current_limit_a = 201.0
 @pytest.mark.parametrize("seed", [1, 5])
 def test_a_large_motor_wired_in_delta_for_star_is_named_before_the_drive_trips(tmp_path, seed):
     """The first tones went from a tenth to nine tenths in one step: the drive tripped, and nothing was said of the wiring."""
-    scenario = tmp_path / "delta.toml"
-    scenario.write_text(LARGE_IN_DELTA, encoding="utf-8")
-    run = commissioned(tmp_path / "runs", Pace(), str(scenario), seed, axes=(0.0,))
+    run = one_axis(tmp_path, LARGE_IN_DELTA, seed)
     assert run.ended.outcome == "rejected"
     assert "wired in delta where the plate says star" in run.ended.reason
     assert run.station.highest_flux_wb < 0.6 * run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))
@@ -120,9 +119,7 @@ hardware_current_limit_a = 102.0
 
 def test_a_second_first_current_is_no_larger_than_the_first_one_permits(tmp_path):
     """2.7 +- 1.9 times the plate's inductance after the first, five times in truth: the second one reached 1.55 of the flux limit."""
-    scenario = tmp_path / "star.toml"
-    scenario.write_text(LOSSY_IN_STAR, encoding="utf-8")
-    run = commissioned(tmp_path / "runs", Pace(), str(scenario), 4, axes=(0.0,), connection="delta")
+    run = one_axis(tmp_path, LOSSY_IN_STAR, 4, connection="delta")
     assert run.ended.outcome == "rejected"
     assert "wired in star where the plate says delta" in run.ended.reason
     assert run.station.highest_flux_wb < 1.02 * run.job.flux_limit_wb(0.24)
@@ -156,9 +153,7 @@ hardware_current_limit_a = 44.3
 @pytest.mark.parametrize("seed", [1, 3])
 def test_levels_that_are_not_apart_leave_the_staircase_its_top(tmp_path, seed):
     """7.5 kW behind a nearly lossless inverter: both levels were held at 0.33 V, the next ones at nothing, and nothing was said of the wiring."""
-    scenario = tmp_path / "delta.toml"
-    scenario.write_text(IN_DELTA_NEARLY_LOSSLESS, encoding="utf-8")
-    run = commissioned(tmp_path / "runs", Pace(), str(scenario), seed, axes=(0.0,))
+    run = one_axis(tmp_path, IN_DELTA_NEARLY_LOSSLESS, seed)
     assert run.ended.outcome == "rejected"
     assert "wired in delta where the plate says star" in run.ended.reason
     assert run.station.highest_flux_wb < 0.6 * run.job.flux_limit_wb(run.findings.resistance_ohm(run.job))

@@ -13,6 +13,7 @@ from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.search.journal import Said
 from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, DataRefused
+from commissioner.estimation.record import CARRIER
 from commissioner.identify.contract import RunningDocument
 from commissioner.motor.nameplate import Nameplate
 from commissioner.operations.events import GoOn, Observe
@@ -24,9 +25,6 @@ from commissioner.recordings.whole import write_texts
 from commissioner.records import RunningRecording
 from commissioner.running.diagnosis import Diagnosis
 from commissioner.running.search import Step
-
-CARRIER = "switching_frequency_hz"
-"""Of the inverter, whose rows' voltages are read by it: what is played by them is to be read so as well."""
 
 
 def readable(tables: Sequence[Table], motor: str | None, step: str) -> tuple[list[RunningRecording], Nameplate]:

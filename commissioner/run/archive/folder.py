@@ -30,7 +30,7 @@ from commissioner.run.archive.blocks import append_frame, frame, read_blocks
 from commissioner.run.archive.documents import damaged, open_no_link
 from commissioner.run.archive.journal import Journal, read_journal
 from commissioner.run.archive.origin import machine_part, this_process
-from commissioner.run.archive.seal import CLOSED, TO_COME, cover_of, covered_files, covers, seal, to_come
+from commissioner.run.archive.seal import CLOSED, TO_COME, as_closed, cover_of, covers, seal, to_come
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.index import note
@@ -169,7 +169,7 @@ def _covered_before(path: Path) -> dict[str, Any]:
     announced = to_come(records)
     seen = covers(path, announced)
     came = {name: seen[name] for name, either in announced.items() if seen.get(name) in either}
-    return {**covered_files([record for record in records if record["kind"] == CLOSED][-1:]), **came}
+    return {**as_closed(records), **came}
 
 
 def _sole_writer(path: Path) -> FileLock | None:

@@ -82,6 +82,11 @@ def covered_files(records: Iterable[Mapping[str, Any]]) -> dict[str, Noted]:
     return found
 
 
+def as_closed(journal: Iterable[Mapping[str, Any]]) -> dict[str, Noted]:
+    """What the last closing record covers."""
+    return covered_files([line for line in journal if line["kind"] == CLOSED][-1:])
+
+
 def to_come(journal: Sequence[Mapping[str, Any]]) -> dict[str, list[Noted]]:
     """What sessions that were killed before one closed the folder had said would take a file's place: the file may be any of these."""
     last = max((number for number, line in enumerate(journal) if line["kind"] == CLOSED), default=len(journal))

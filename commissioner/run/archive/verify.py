@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.run.archive.documents import Loss
 from commissioner.run.archive.journal import FIRST, Line, Record, read_lines
-from commissioner.run.archive.seal import CLOSED, cover, covered_files, is_sealed_by, to_come
+from commissioner.run.archive.seal import CLOSED, as_closed, cover, covered_files, is_sealed_by, to_come
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import read_file
 
@@ -254,7 +254,7 @@ def _first_unlike(data: bytes, whole: list[Record]) -> int | None:
 # --- files -----------------------------------------------------------------------------------------------------------
 def _file_losses(folder: Path, whole: list[Record]) -> Iterator[Loss]:
     announced = to_come(whole)
-    for name, wanted in covered_files(_closings(whole)[-1:]).items():
+    for name, wanted in as_closed(whole).items():
         path = folder / Path(str(name)).name
         if not path.is_file():
             yield Loss(str(name), None, "the file is gone")
