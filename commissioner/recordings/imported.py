@@ -32,6 +32,11 @@ from commissioner.report.page import BLUE, GREEN, ORANGE, PLOT_STYLE, Page, Pict
 from commissioner.report.page import Table as Rows
 
 MOST_DRAWN = 4000
+OF_NO_USE = ReadingNote(
+    "unknown_kind",
+    "nothing here was taken for a voltage: from currents alone `commissioner monitor` tells what it can, `identify` and `diagnose` nothing; name the columns (--map FILE.toml, `commissioner docs formats`) or export them with units in the header",
+)
+"""Said where the columns do not say what was measured."""
 
 
 class ColumnRow(TypedDict):
@@ -76,14 +81,15 @@ def understand(path: Path, mapping: ChannelMap | None = None) -> tuple[Table, Un
     period = None
     if time is not None and time.size > 1:
         period = sample_period(table, table.columns.get("segment", np.zeros(time.size)))
+    kind = kind_of(table)
     return table, {
         "file": str(path),
-        "kind": kind_of(table),
+        "kind": kind,
         "rows": 0 if time is None else int(time.size),
         "sample_period_s": period,
         "columns": [_column(table, r) for r in table.readings],
         "metadata": dict(table.metadata),
-        "changes": list(table.notes),
+        "changes": [*table.notes, *([OF_NO_USE] if kind == "unknown" else [])],
         "states": _states(table, period),
         "phase_order": {kind: order for kind in ("current", "voltage") if (order := _order(table, kind, period))},
     }

@@ -6,12 +6,17 @@ import struct
 from collections.abc import Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from commissioner.errors import ReplyTimeout, RequestRefused
+from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.port import LinkStats, Words
+from commissioner.run import restore as restoring
+from commissioner.run.archive.catalogue import find_run
 from commissioner.run.commission import Commissioned
 from commissioner.run.tuning.tune import Clock, TuneOrder, order_of, tune
 from commissioner.settings import load_motor, load_procedure
@@ -175,3 +180,11 @@ def try_tune(
     wanted = TuneOrder(order, repeat, pause_s, hardwired_stop=True, power_cycle=power_cycle)
     done = tune(wanted, folder, person, lambda _: None, open_port=opened, clock=Clock(clock.sleep, clock.now))
     return Tried(done, drive.truth(), before, drive, person)
+
+
+def take_back(folder: Path, drive: VendorDrive, clock: JumpingClock) -> None:
+    """`restore` of the last run in this archive, on the drive and its clock."""
+    on_its_clock = partial(Inverter, sleep=clock.sleep, clock=clock.now)
+    port = VendorPort(drive, clock)
+    with patch.multiple(restoring, open_port=lambda *_, **__: port, Inverter=on_its_clock):
+        restoring.restore(find_run(folder, "last"), None)

@@ -13,7 +13,6 @@ from commissioner.errors import CheckFailed, IdentityMismatch, WriteBackFailed
 from commissioner.link.drive.facts import Action
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
-from commissioner.run import restore as restoring
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.tuning.tune import TuneOrder, order_of, tune
@@ -36,7 +35,7 @@ def test_a_tuning_ends_in_the_right_outcome_on_every_family(case, tmp_path):
     assert wrong
 
 
-def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monkeypatch):
+def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path):
     """Check, snapshot, three tunings, write, power cycle, read back; then `restore`, on every family that can be written."""
     for name in names():
         if "restore" not in load_profile(name).capabilities:
@@ -46,9 +45,7 @@ def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monke
         assert "proved: the values outlasted a power-off" in tried.done.result["remarks"]
         assert tried.truth["held"] != tried.before
         described("tune", {**tried.done.result, "folder": str(tried.done.folder)})
-        clock = tried.person.clock
-        monkeypatch.setattr(restoring, "open_port", lambda *_, d=tried.drive, c=clock, **__: bench.VendorPort(d, c))
-        restoring.restore(find_run(tmp_path / Path(name).stem, "last"), None)
+        bench.take_back(tmp_path / Path(name).stem, tried.drive, tried.person.clock)
         assert tried.drive.truth()["held"] == tried.before, name
 
 
@@ -59,9 +56,7 @@ HABITS = [Habits(late_s=LONGER_THAN_ANY_SETTLES_S), *(Habits(refuses_from=n) for
 
 @pytest.mark.parametrize("write_back", [True, False])
 @pytest.mark.parametrize("turn", range(len(HABITS)))
-def test_a_tune_whose_drive_does_not_show_or_take_what_is_written_never_says_what_is_not_so(
-    turn, write_back, tmp_path, monkeypatch
-):
+def test_a_tune_whose_drive_does_not_show_or_take_what_is_written_never_says_what_is_not_so(turn, write_back, tmp_path):
     """Every second family by turns: all of them without these habits stand above."""
     habits = HABITS[turn]
     for name in WRITABLE[(turn + write_back) % 2 :: 2]:
@@ -79,10 +74,7 @@ def test_a_tune_whose_drive_does_not_show_or_take_what_is_written_never_says_wha
         summary = find_run(folder, "last")
         assert summary.is_unknown == said.startswith("unknown"), name
         drive.habits = Habits()
-        monkeypatch.setattr(
-            restoring, "open_port", lambda *_, d=drive, c=tried.person.clock, **__: bench.VendorPort(d, c)
-        )
-        restoring.restore(summary, None)
+        bench.take_back(folder, drive, tried.person.clock)
         assert drive.truth()["held"] == tried.before, name
 
 
@@ -119,19 +111,18 @@ def test_a_disk_that_fills_up_while_a_tune_brings_the_old_values_back_is_not_tol
 
 
 @pytest.mark.parametrize("how", ["good", "fails"])
-def test_a_tune_is_not_taken_back_from_a_drive_that_holds_what_it_neither_found_nor_left(how, tmp_path, monkeypatch):
+def test_a_tune_is_not_taken_back_from_a_drive_that_holds_what_it_neither_found_nor_left(how, tmp_path):
     """No register tells two drives of a type apart, their values do; after a tuning that failed nobody knows what it left."""
     tried = bench.try_tune("schneider_atv340", tmp_path, habits=Habits(tunings=(how,)))
     other = tried.drive
     cell = other.face.cells["stator_resistance"]
     other.words[cell.address] += 7
-    monkeypatch.setattr(restoring, "open_port", lambda *_, c=tried.person.clock, **__: bench.VendorPort(other, c))
     if how == "fails":
-        restoring.restore(find_run(tmp_path, "last"), None)
+        bench.take_back(tmp_path, other, tried.person.clock)
         assert other.truth()["held"] == tried.before
         return
     with pytest.raises(IdentityMismatch, match="neither found nor wrote") as refused:
-        restoring.restore(find_run(tmp_path, "last"), None)
+        bench.take_back(tmp_path, other, tried.person.clock)
     assert "another drive of its type" in refused.value.remedy
     assert other.truth()["held"]["stator_resistance"] == tried.truth["held"]["stator_resistance"] + 7
 

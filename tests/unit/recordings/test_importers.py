@@ -10,6 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from commissioner.errors import DataRefused, UsageError
+from commissioner.recordings.imported import OF_NO_USE, understand
 from commissioner.recordings.importers import import_table, read_running
 from commissioner.recordings.names import meaning_of
 
@@ -218,3 +219,11 @@ def test_a_row_of_labels_names_the_columns_whether_a_cell_stands_below_its_key_o
     recording = read_running(path)
     np.testing.assert_allclose(recording.currents_a[0], CHANNELS[0], atol=1e-6)
     np.testing.assert_allclose(recording.currents_a[1], CHANNELS[1], atol=1e-6)
+
+
+def test_a_file_that_says_nothing_of_a_motor_is_told_what_to_do_about_it(tmp_path: Path) -> None:
+    (tmp_path / "unnamed.csv").write_text("a,b\n1,2\n3,4\n", "utf-8")
+    (tmp_path / "named.csv").write_text("time_s,voltage_uv_v\n0,2\n1,4\n", "utf-8")
+    unnamed, named = (understand(tmp_path / name)[1]["changes"] for name in ("unnamed.csv", "named.csv"))
+    assert OF_NO_USE in unnamed and OF_NO_USE not in named
+    assert "--map" in OF_NO_USE.what
