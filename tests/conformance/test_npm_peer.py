@@ -77,7 +77,7 @@ def write_and_restore(inverter):
     assert inverter.snapshot().in_use == found.in_use
 
 
-@pytest.mark.parametrize("delay_ms", [0, 60])
+@pytest.mark.parametrize("delay_ms", [0, 15])
 def test_a_drive_of_modbus_serial_is_read_written_and_restored_over_tcp(modules, delay_ms):
     with NodeDrive(modules, delay_ms=delay_ms) as drive, danfoss(drive.url + "?device=255") as inverter:
         assert inverter.read_nameplate()["rated_current_a"] == pytest.approx(5.0)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from commissioner.link.files.drive_file import DRIVES_FOLDER
 from tests.support.command_line import call
 from tests.support.raw_servers import Bank, TcpDevice
 from tests.support.service.described import judge
@@ -47,6 +48,16 @@ def drive():
         yield device
 
 
+@pytest.fixture
+def danfoss(tmp_path):
+    """Its file, with a pause of its own after a write that a test can wait for; 5 s are in the one that is shipped."""
+    path = tmp_path / "danfoss.toml"
+    text = (DRIVES_FOLDER / "danfoss_fc302.toml").read_text("utf-8")
+    assert "settle_s = 5.0" in text
+    path.write_text(text.replace("settle_s = 5.0", "settle_s = 0.2"), "utf-8")
+    return str(path)
+
+
 def write(recording, drive, runs, profile="danfoss_fc302"):
     return call(
         "identify", str(recording), "--write-back", "--drive", f"tcp://127.0.0.1:{drive.port}", "--profile", profile,
@@ -59,8 +70,8 @@ def held(drive):
     return 1e-4 * (high << 16 | low)
 
 
-def test_an_accepted_recording_is_written_in_the_drives_terms_and_restored_from_the_run(recording, drive, tmp_path):
-    answer = write(recording, drive, tmp_path)
+def test_an_accepted_recording_is_written_in_the_drives_terms_and_restored_from_the_run(recording, drive, danfoss, tmp_path):
+    answer = write(recording, drive, tmp_path, danfoss)
     assert (answer.code, answer.json["outcome"]) == (0, "commissioned")
     found = answer.json["parameters"]["stator_resistance_ohm"]["value"]
     assert held(drive) == pytest.approx(found, abs=1e-4)

@@ -207,8 +207,8 @@ def test_a_drive_that_is_busy_after_a_write_says_so_by_the_code_of_its_file():
 
 
 def test_an_answer_takes_the_turnaround_of_the_file_unless_told_otherwise():
-    def took(*options):
-        with Vendor("yaskawa_a1000", *options) as drive:
+    def took(turnaround_s):
+        with Vendor("yaskawa_a1000", turnaround_s=turnaround_s) as drive:
             host, port = drive.url.removeprefix("tcp://").split(":")
             with socket.create_connection((host, int(port))) as line:
                 began = time.monotonic()
@@ -216,5 +216,5 @@ def test_an_answer_takes_the_turnaround_of_the_file_unless_told_otherwise():
                 line.recv(64)
                 return time.monotonic() - began
 
-    assert took() >= read_face("yaskawa_a1000").turnaround_s
-    assert took("--turnaround", "0") < 0.05
+    assert took(None) >= read_face("yaskawa_a1000").turnaround_s
+    assert took(0.0) < 0.05

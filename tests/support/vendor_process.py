@@ -29,10 +29,12 @@ profile = "danfoss_fc302"
 
 
 class Vendor:
-    """`python -m sim.vendors.serve` as a process; `truth` after the block."""
+    """`python -m sim.vendors.serve` as a process; `truth` after the block. `turnaround_s`: before each answer, None for that of the drive's
+    file."""
 
-    def __init__(self, *arguments: str) -> None:
-        self._command = [sys.executable, "-m", "sim.vendors.serve", *arguments]
+    def __init__(self, *arguments: str, turnaround_s: float | None = 0.004) -> None:
+        quick = [] if turnaround_s is None else ["--turnaround", str(turnaround_s)]
+        self._command = [sys.executable, "-m", "sim.vendors.serve", *quick, *arguments]
         self.truth: dict[str, Any] = {}
 
     def __enter__(self) -> Vendor:

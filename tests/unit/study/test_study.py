@@ -226,12 +226,12 @@ def test_rows_are_the_same_for_one_worker_and_two_and_right(tmp_path):
     text = 'kind = "commission"\nruns = 2\nmotors = ["haumer_132m04", "abb_2k2"]\nspread = 0.1\naxes_deg = [0.0]\nseed = 4\n'
     path = study_file(tmp_path, text)
     cases = cases_of(load(path, Specification), path, simulator().motors())
-    alone = {told["case"]: told for told in map(carried_out, cases)}
+    alone = carried_out(cases[0])
     shared = {told["case"]: told for told in here(cases, 2)}
-    for case, told in alone.items():
-        assert {k: v for k, v in told.items() if k != "cpu_s"} == {
-            k: v for k, v in json.loads(json.dumps(shared[case])).items() if k != "cpu_s"
-        }
+    assert {k: v for k, v in alone.items() if k != "cpu_s"} == {
+        k: v for k, v in json.loads(json.dumps(shared[alone["case"]])).items() if k != "cpu_s"
+    }
+    for told in shared.values():
         judge("study_row", told)
         assert told["outcome"] == "commissioned", told["reason"]
         assert told["peak_flux_fraction"] <= 1.02
