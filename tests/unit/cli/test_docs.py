@@ -15,7 +15,7 @@ from tests.unit.cli.test_failures import leave
 ROOT = Path(__file__).parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CHAPTERS = {
-    "accuracy", "monitoring", "diagnosis", "running", "blind", "reliability", "formats", "drives", "porting", "service", "archive", "study", "pipeline", "benchmarks", "development", "changelog",
+    "accuracy", "monitoring", "diagnosis", "running", "running_blind", "blind", "reliability", "formats", "drives", "porting", "service", "archive", "study", "pipeline", "benchmarks", "development", "changelog",
 }  # fmt: skip
 PAGES = {"README": README} | {name: read_chapter(name) for name in sorted(CHAPTERS)}
 FOLDERS = "commissioner|sim|config|tests|.github|.ci"
