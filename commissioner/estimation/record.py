@@ -46,6 +46,8 @@ OPEN = 0.15
 """Of rated peak: what the other phases carry where one is open."""
 MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
+STARTS = 2.0
+"""Of the usual current: what flows in a start at least."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
 CARRIER = "switching_frequency_hz"
@@ -160,7 +162,14 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     windows: list[Window] = []
     remarks: list[str] = []
     standing_still: list[str] = []
-    has_speed = all(r.speed_rad_per_s is not None and np.isfinite(r.speed_rad_per_s).any() for r in recordings)
+    named = [r.source for r in recordings if _is_named_speed(r)]
+    if named:
+        remarks.append(
+            f"{', '.join(named)}: the speed is one number all along, while the motor starts: a set point or a plate's, and not used."
+        )
+    has_speed = not named and all(
+        r.speed_rad_per_s is not None and np.isfinite(r.speed_rad_per_s).any() for r in recordings
+    )
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
     has_zero = not computed and all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
     sigmas, without = [], set("uvw") if computed else set[str]()
@@ -232,6 +241,21 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _is_named_speed(one: RunningRecording) -> bool:
+    """Whether the speed column holds one number of a shaft that turns, beside the current of a start."""
+    speed, current = one.speed_rad_per_s, np.sqrt(np.nanmean(np.square(one.currents_a), axis=0))
+    if (
+        speed is None
+        or not np.isfinite(speed).any()
+        or np.nanmax(np.abs(speed)) == 0.0
+        or np.nanmax(speed) > np.nanmin(speed)
+    ):
+        return False
+    block = max(round(BLOCK_S / one.sample_period_s), 1)
+    means = current[: current.size // block * block].reshape(-1, block).mean(axis=1)
+    return bool(means.size and np.nanmax(means) > STARTS * np.nanmedian(means))
 
 
 def _carrier_hz(one: RunningRecording) -> float:

@@ -29,7 +29,7 @@ from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text,
 from commissioner.recordings.formats.parquet import columns_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.said_tests import codes, is_title, unknown
-from commissioner.recordings.reading.slow_columns import currents_on_the_commands_clock, on_one_clock
+from commissioner.recordings.reading.slow_columns import currents_on_the_commands_clock, on_one_clock, stood_still
 from commissioner.recordings.standstill.components import require_degrees, with_segment
 from commissioner.recordings.units import without_brackets
 from commissioner.recordings.whole import whole_file
@@ -300,6 +300,7 @@ def to_running(table: Table) -> RunningRecording:
     _require(table, _all_but_one(CURRENTS, columns), "a running-motor recording")
     _require(table, ("time_s", *(_all_but_one(line, columns) if is_line else phase)), "a running-motor recording")
     table = _without_unmeasured(table, *on_one_clock(columns, (*CURRENTS, *voltages), table.source))
+    table = _without_still(_without_still(table, CURRENTS), voltages)
     columns = table.columns
     empty = np.full(columns["time_s"].size, np.nan)
     time = columns["time_s"]
@@ -317,6 +318,23 @@ def to_running(table: Table) -> RunningRecording:
         source=table.source,
         notes=table.notes,
     )
+
+
+def _without_still(table: Table, channels: Sequence[str]) -> Table:
+    """NaN where one of these channels stood still while the others went on. DataRefused: all along, and the others do not tell it."""
+    here = [name for name in channels if name in table.columns]
+    columns, notes, time = dict(table.columns), list(table.notes), table.columns["time_s"]
+    for name, rows in stood_still(columns, here, is_current=channels == CURRENTS).items():
+        value = f"{columns[name][rows][0]:.4g}"
+        said = f"{name} stands at {value} from {time[rows][0]:.3g} s on, {int(rows.sum())} rows in all, while the others move"
+        if rows.all() and (len(here) < len(channels) or name.removeprefix("voltage_") in {"u_v", "v_v", "w_v"}):
+            raise _refuse(
+                table.source, f"{said}: it was not measured", value, "a channel that moves as the others do",
+                "look at its probe and its export, and record again",
+            )  # fmt: skip
+        columns[name] = np.where(rows, np.nan, columns[name])
+        notes.append(ReadingNote("still_channel", f"{said}: not used there"))
+    return replace(table, columns=columns, notes=tuple(notes))
 
 
 def to_currents(table: Table) -> RunningRecording:

@@ -1,6 +1,7 @@
-"""Columns that a slower clock sampled than wrote their rows: a value stands for several rows, lies on a straight line between two, or is not there.
+"""Columns in which not every row was measured: a slower clock sampled than wrote them, so that a value stands for several rows, lies on a
+straight line between two, or is not there; or a channel stood still while the others of its kind went on.
 
-What stands between was not measured, and a fit would take it for the motor.
+What stands there was not measured, and a fit would take it for the motor.
 """
 
 from __future__ import annotations
@@ -20,6 +21,13 @@ REGULAR = 0.99
 HELD, ON_LINES, BLANK = "stand", "lie on straight lines", "are blank"
 PRINTED = 3.0
 """Last places by which a rounded straight line bends."""
+LEAST_STILL, MOST_TURNS = 50, 4
+"""Rows of one value, and how often another channel passes its mean meanwhile, from which a channel stands still: two periods. (A converter at its end holds a
+value for half of one, the voltage of six steps for a third.)"""
+GOES_ON = 0.2
+"""Of a channel's standard deviation in the whole file, from which it goes on in a part."""
+NO_CURRENT = 0.15
+"""Of what the others carry: below, a current that stands still may be one that does not flow."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,32 @@ def on_one_clock(
 ) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
     """(columns, of how many rows one is left, what was left out). DataRefused: slow columns whose new rows are not the same."""
     return _measured(columns, _slow(columns, watched, begins), source, begins)
+
+
+def stood_still(columns: Mapping[str, Signal], channels: Sequence[str], *, is_current: bool) -> dict[str, np.ndarray]:
+    """Of each channel that stood still while another of these went on: the rows, `(n,)` bool. An exported value that is no longer renewed, a probe
+    that has come off: 326 V all along were taken for a voltage, and the shaft was said to turn three times too fast."""
+    still = {}
+    for name in channels:
+        values, others = columns[name], [columns[other] for other in channels if other != name]
+        ends = np.append(np.flatnonzero(np.diff(values)) + 1, values.size)
+        rows = np.zeros(values.size, dtype=bool)
+        for begin, end in zip([0, *ends[:-1]], ends, strict=True):
+            run = slice(begin, end)
+            if end - begin >= LEAST_STILL and any(_goes_on(x, run) for x in others):
+                usual = max(float(np.nanmedian(np.abs(x[run]))) for x in others if np.isfinite(x[run]).any())
+                rows[run] = not is_current or abs(values[begin]) > NO_CURRENT * usual
+        if rows.any():
+            still[name] = rows
+    return still
+
+
+def _goes_on(values: Signal, run: slice) -> bool:
+    """Whether a channel turns there, by no less than it does elsewhere: steps of a converter before a motor is switched on are none."""
+    there = values[run][np.isfinite(values[run])]
+    if there.size == 0 or np.std(there) < GOES_ON * np.nanstd(values):
+        return False
+    return int(np.count_nonzero(np.diff(there > there.mean()))) >= MOST_TURNS
 
 
 def currents_on_the_commands_clock(

@@ -289,3 +289,15 @@ def test_a_carrier_that_is_no_frequency_is_refused(start, named):
     with pytest.raises(DataRefused, match="switching_frequency_hz is no frequency") as refused:
         prepare([replace(recording, metadata=metadata)], plate)
     assert "in Hz" in refused.value.remedy
+
+
+def test_a_speed_that_is_one_number_while_the_motor_starts_is_not_used(start):
+    recording, plate = start
+    told = prepare([replace(recording, speed_rad_per_s=np.full(recording.time_s.size, 150.4))], plate)
+    assert not told.has_speed and any("one number all along" in said for said in told.remarks)
+    steady = slice(recording.time_s.size // 2, None)
+    cut = replace(
+        recording, time_s=recording.time_s[steady], speed_rad_per_s=np.full(recording.time_s[steady].size, 150.4),
+        currents_a=tuple(x[steady] for x in recording.currents_a), voltages_v=tuple(x[steady] for x in recording.voltages_v),
+    )  # fmt: skip
+    assert prepare([cut], plate).has_speed

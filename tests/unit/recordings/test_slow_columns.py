@@ -111,3 +111,58 @@ def test_at_standstill_they_are_left_where_the_command_stands_between_them_too()
     for command_every in (1, 2, 8):
         with pytest.raises(DataRefused, match="every 4 rows"):
             to_standstill(standing(command_every, 4))
+
+
+LINES = ("voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
+
+
+def fed(kind="uv_v", **changed):
+    """A motor's currents and voltages; `changed`: what a channel shows instead, by its name."""
+    turns = [np.cos(2.0 * np.pi * 50.0 * TIME - k * 2.0 * np.pi / 3.0) for k in range(3)]
+    volts = LINES if kind == "uv_v" else ("voltage_u_v", "voltage_v_v", "voltage_w_v")
+    columns = {f"current_{p}_a": 4.0 * x for p, x in zip("uvw", turns, strict=True)}
+    columns |= {name: 325.0 * x for name, x in zip(volts, turns, strict=True)}
+    return Table({"time_s": TIME, **columns, **changed}, {}, "fed.csv")
+
+
+FROM = np.arange(ROWS) >= 2500
+
+
+@pytest.mark.parametrize("channel", ["current_v_a", "voltage_vw_v"])
+def test_what_a_channel_shows_once_it_stands_still_is_no_value(channel):
+    whole = fed().columns[channel]
+    seen = to_running(fed(**{channel: np.where(FROM, whole[2500], whole)}))
+    shown = (seen.currents_a if "current" in channel else seen.voltages_v)[1]
+    assert np.array_equal(np.isnan(shown), FROM)
+    assert np.array_equal(shown[~FROM], whole[~FROM])
+    (note,) = [n.what for n in seen.notes if n.code == "still_channel"]
+    assert channel in note and "from 1.25 s on, 1500 rows" in note
+
+
+def test_a_channel_that_stood_still_all_along_follows_from_two_or_is_refused():
+    assert np.isnan(to_running(fed(current_w_a=np.full(ROWS, 2.9))).currents_a[2]).all()
+    with pytest.raises(DataRefused, match="voltage_u_v stands at 312"):
+        to_running(fed("u_v", voltage_u_v=np.full(ROWS, 312.0)))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"current_u_a": np.zeros(ROWS)},  # an open line: no current flows
+        {"current_u_a": np.clip(4.0 * np.cos(2.0 * np.pi * 50.0 * TIME), -3.0, 3.0)},
+        {
+            name: 270.0 * np.round(np.clip(2.0 * np.cos(2.0 * np.pi * (5.0 * TIME - k / 3.0)), -1.0, 1.0))
+            for k, name in enumerate(LINES)
+        },
+        {name: np.where(FROM, 1.0, fed().columns[name]) for name in ("current_u_a", "current_v_a", "current_w_a")},
+        {
+            name: np.where(FROM, fed().columns[name], k * 0.3 * (np.arange(ROWS) % 7 < 3))
+            for k, name in enumerate(LINES)
+        },
+    ],
+    ids=["open", "clipped", "six_steps", "all_three", "before_it_is_fed"],
+)
+def test_what_stands_as_motors_and_inverters_make_it_is_measured(changed):
+    seen = to_running(fed(**changed))
+    assert not [n for n in seen.notes if n.code == "still_channel"]
+    assert np.isfinite([*seen.currents_a, *seen.voltages_v]).all()
