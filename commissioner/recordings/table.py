@@ -227,6 +227,7 @@ def to_standstill(table: Table) -> StandstillRecording:
     clocked = currents_on_the_commands_clock(columns, CURRENTS, "voltage_axis_v", table.source, begins)
     table = _without_unmeasured(table, *clocked)
     columns, segment = table.columns, table.columns["segment"]
+    _require_currents_to_the_end(table)
     period = sample_period(table, segment)
     recording = StandstillRecording(
         time_s=columns["time_s"],
@@ -318,6 +319,19 @@ def to_running(table: Table) -> RunningRecording:
         source=table.source,
         notes=table.notes,
     )
+
+
+def _require_currents_to_the_end(table: Table) -> None:
+    """DataRefused where a current stands still up to the last row while the others flow. (One that does so for a while is at its range's end.)"""
+    here = [name for name in CURRENTS if name in table.columns]
+    for name, rows in stood_still(table.columns, here, is_current=True).items():
+        if rows[-1]:
+            since = int(np.flatnonzero(~rows)[-1]) + 1 if not rows.all() else 0
+            value = f"{table.columns[name][-1]:.4g} A"
+            raise _refuse(
+                table.source, f"{name} stands at {value} from {table.columns['time_s'][since]:.3g} s to the end while the others flow: it was not measured", value,
+                "a current that moves as the others do", "look at its sensor, its lead and its export, and record again; two sound phases are enough, leave the third out",
+            )  # fmt: skip
 
 
 def _without_still(table: Table, channels: Sequence[str]) -> Table:

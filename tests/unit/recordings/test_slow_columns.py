@@ -166,3 +166,16 @@ def test_what_stands_as_motors_and_inverters_make_it_is_measured(changed):
     seen = to_running(fed(**changed))
     assert not [n for n in seen.notes if n.code == "still_channel"]
     assert np.isfinite([*seen.currents_a, *seen.voltages_v]).all()
+
+
+def test_at_standstill_a_current_that_stands_still_to_the_end_is_named_and_one_at_its_end_is_not():
+    third = 1.3 * np.cos(2.0 * np.pi * 20.0 * TIME)
+    columns = {
+        "time_s": TIME, "segment": np.zeros(ROWS), "axis_deg": np.zeros(ROWS), "voltage_axis_v": 10.0 * MEASURED,
+        "current_u_a": MEASURED, "current_v_a": third, "current_w_a": -MEASURED - third,
+    }  # fmt: skip
+    clipped = {**columns, "current_v_a": np.where(TIME < 0.5, 1.9, third)}
+    assert to_standstill(Table(clipped, {}, "file.csv")).current_u_a.size == ROWS
+    for still, since in ((np.full(ROWS, 2.0), "0 s"), (np.where(FROM, 2.0, third), "1.25 s")):
+        with pytest.raises(DataRefused, match=f"current_v_a stands at 2 A from {since} to the end"):
+            to_standstill(Table({**columns, "current_v_a": still}, {}, "file.csv"))
