@@ -237,14 +237,17 @@ def _drawn(impedance: complex, voltage_v: float, frequency_hz: float, slip: floa
 def contradiction(seen: OperatingPoint, plate: Nameplate) -> Contradiction | None:
     """Whether the data's currents and powers are the plate's at this point; None where they are."""
     said = plate_point(plate, seen)
-    factor = _factor(seen, said)
-    if factor is None and seen.power_w * said.power_w < 0.0 and abs(seen.power_w - said.power_w) > plate.rated_power_w:
-        factor, likely, given = seen.current_a / said.current_a, None, _opposite(seen, said)
-    elif factor is None or SCALE[0] <= factor <= SCALE[1]:
-        return None
-    else:
+    ratios = _ratios(seen, said)
+    if ratios is not None:
+        factor = _mean(ratios)
+        if SCALE[0] <= factor <= SCALE[1]:
+            return None
         likely, why = _usual(factor)
-        given = f"give {_times(seen, said, factor)}{why}"
+        given = f"give {_times(ratios)}{why}"
+    elif seen.power_w * said.power_w < 0.0 and abs(seen.power_w - said.power_w) > plate.rated_power_w:
+        factor, likely, given = seen.current_a / said.current_a, None, _opposite(seen, said)
+    else:
+        return None
     return Contradiction(
         f"the data do not belong to this plate: at {seen.voltage_v * math.sqrt(3.0):.4g} V, {seen.frequency_hz:.4g} Hz and a slip "
         f"of {seen.slip:.3g} they {given}",
@@ -277,7 +280,11 @@ def doubt(seen: OperatingPoint, plate: Nameplate) -> str:
 def _factor(seen: OperatingPoint, said: OperatingPoint) -> float | None:
     """Geometric mean of current, active and reactive power over the plate's; None where one of them has another sign."""
     ratios = _ratios(seen, said)
-    return None if ratios is None else math.prod(ratios) ** (1.0 / 3.0)
+    return None if ratios is None else _mean(ratios)
+
+
+def _mean(ratios: tuple[float, float, float]) -> float:
+    return math.prod(ratios) ** (1.0 / 3.0)
 
 
 def _ratios(seen: OperatingPoint, said: OperatingPoint) -> tuple[float, float, float] | None:
@@ -295,9 +302,9 @@ def disagreement(seen: OperatingPoint, plate: Nameplate) -> float:
     return math.inf if ratios is None else math.log(max(ratios) / min(ratios))
 
 
-def _times(seen: OperatingPoint, said: OperatingPoint, factor: float) -> str:
+def _times(ratios: tuple[float, float, float]) -> str:
     """One number where current and powers have it in common, else each with its own."""
-    current, active, reactive = _ratios(seen, said) or (factor, factor, factor)
+    factor, (current, active, reactive) = _mean(ratios), ratios
     if abs(math.log(current / factor)) < ALIKE:
         return f"{factor:.3g} times the plate's current and power"
     return (

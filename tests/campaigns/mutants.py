@@ -95,6 +95,13 @@ EXPLAINED = {
         "ratios = [a / b for a, b in zip(machine.as_tuple(), typical.as_tuple(), strict=True)]",
     ): "strict or not: four values, four values",
     ("commissioner.motor.plate_match", "> 0.27 -> abs(math.log(size / near[0])) >= 0.27"): ROUNDED,
+    ("commissioner.motor.plate_match", "<= OTHER_CONNECTION * MOST_INDUCTIVE -> least <"): ROUNDED,
+    (
+        "commissioner.motor.plate_match",
+        "<= factor * match.current_ratio <= CURRENT_RATIO[1] -> CURRENT_RATIO[0] <",
+    ): ROUNDED,
+    ("commissioner.motor.plate_match", "< ALIKE -> abs(math.log(current / factor)) <= ALIKE"): ROUNDED,
+    ("commissioner.motor.plate_match", "> plate.rated_power_w -> abs(seen.power_w - said.power_w) >="): ROUNDED,
     ("commissioner.motor.plate_match", "factor > 1.0 -> factor >= 1.0"): "no usual factor is near 1",
 }
 """(module, part of the line with the mutant in it or of the mutant's name) of survivors, and why no test can kill them."""

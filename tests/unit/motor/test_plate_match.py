@@ -14,6 +14,7 @@ from commissioner.motor.plate_match import (
     MOST_INDUCTIVE,
     PlateMatch,
     PlateMismatch,
+    current_mismatch,
     inductance_mismatch,
     mismatch,
     plate_match,
@@ -214,6 +215,24 @@ def test_a_first_inductance_whose_range_reaches_a_star_for_delta_names_it():
     assert "is wired in star" in inductance_mismatch(6.3 * typical_h, 1.6 * typical_h, delta).what
     assert "wired" not in inductance_mismatch(6.3 * typical_h, 0.1 * typical_h, delta).what
     assert "wired" not in inductance_mismatch(6.3 * typical_h, 1.6 * typical_h, PLATE).what
+
+
+@pytest.mark.parametrize(
+    ("over", "connection", "says"),
+    [
+        (1.45, "star", None), (0.3, "star", None), (1.46, "star", "may be wired in delta"), (2.44, "star", "may be wired in delta"),
+        (2.45, "star", "is wired in delta"), (3.2, "star", "is wired in delta"), (1.45, "delta", None),
+        (2.0, "delta", "draws more than the plate's motor would; all impedances are 0.5 times what"),
+        (4.0, "delta", "draws more than the plate's motor would; all impedances are 0.25 times what"),
+    ],
+)  # fmt: skip
+def test_what_a_test_draws_names_a_delta_for_a_star_alone(over, connection, says):
+    found = current_mismatch(over, replace(PLATE, connection=connection))
+    if says is None:
+        assert found is None
+    else:
+        assert says in f"{found.what}; {found.remedy}"
+        assert (found.value, found.limit) == (over, "at most 1.45 times the plate's typical")
 
 
 def test_the_largest_first_inductance_is_still_the_plates():

@@ -13,6 +13,7 @@ from commissioner.motor.plate_match import (
     OperatingPoint,
     _factor,
     contradiction,
+    disagreement,
     doubt,
     plate_point,
     rated_point,
@@ -252,3 +253,54 @@ def test_a_circuit_by_hand():
     drawn = rated_point(InverseGamma(1.0, 25.0 * PLATE.rated_slip, 4.0 / w, 25.0 / w), PLATE)
     current_a = 400.0 / math.sqrt(3.0) / math.hypot(13.5, 16.5)
     assert astuple(drawn)[3:] == pytest.approx((current_a, 3 * 13.5 * current_a**2, 3 * 16.5 * current_a**2))
+
+
+@pytest.mark.parametrize(
+    ("off", "is_one"), [(1.0, True), (1.04, True), (1.05, False), (1 / 1.04, True), (1 / 1.05, False)]
+)
+def test_one_number_is_said_where_current_and_powers_have_it_in_common(off, is_one):
+    """A current that is `off` beside both powers is off by two thirds of it beside the mean: 3 % at exp(0.045)."""
+    point = times(RATED, 2.5)
+    what = contradiction(replace(point, current_a=off * point.current_a), PLATE).what
+    if is_one:
+        assert (
+            f"they give {2.5 * off ** (1 / 3):.3g} times" in what
+            and "times the plate's current and power" in what
+            and "mean" not in what
+        )
+    else:
+        mean = 2.5 * off ** (1 / 3)
+        assert (
+            f"{2.5 * off:.3g} times the plate's current, 2.5 times its active and 2.5 times its reactive power, {mean:.3g} times in"
+            in what
+        )
+
+
+def test_three_ratios_disagree_by_the_largest_over_the_smallest():
+    assert disagreement(times(RATED, 2.5), PLATE) == pytest.approx(0.0, abs=1e-6)
+    one = replace(RATED, current_a=2.0 * RATED.current_a, power_w=0.25 * RATED.power_w)
+    assert disagreement(one, PLATE) == pytest.approx(math.log(8.0), abs=1e-6)
+    assert disagreement(replace(RATED, power_w=-RATED.power_w), PLATE) == math.inf
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_power_that_flows_the_other_way_than_the_slip_lets_it_is_said(way):
+    """Of a motor and of a generator, from the rated power on between the two; below, losses may make up for it."""
+    at = replace(RATED, slip=way * RATED.slip)
+    said = plate_point(PLATE, at)
+    assert math.copysign(1.0, said.power_w) == way
+    seen = replace(said, current_a=3.0 * said.current_a, power_w=-said.power_w)
+    found = contradiction(seen, PLATE)
+    assert found.likely is None and found.factor == pytest.approx(3.0)
+    does = "takes" if way > 0.0 else "gives back"
+    assert f"show {seen.power_w:.4g} W, where the plate's machine {does} {abs(said.power_w):.4g} W" in found.what
+    idling = plate_point(PLATE, replace(RATED, slip=way * 0.01))
+    for share in (0.999, 1.001):
+        other = replace(idling, power_w=idling.power_w - way * share * PLATE.rated_power_w)
+        assert other.power_w * idling.power_w < 0.0
+        assert (contradiction(other, PLATE) is not None) is (share > 1.0)
+
+
+def test_a_power_of_none_contradicts_nothing():
+    assert contradiction(replace(RATED, power_w=0.0), PLATE) is None
+    assert contradiction(replace(RATED, reactive_var=-RATED.reactive_var), PLATE) is None
