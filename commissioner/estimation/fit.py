@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
-from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, march, tangents
+from commissioner.estimation.kernels.whitening import NO_ROW
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
@@ -21,10 +22,6 @@ Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
 FIRST = (0, 1, 2, 3)
 """Numbers of a window's first state that are free: both fluxes. (8 is the speed, where the shaft is modelled and already turns.)"""
-LARGEST = 1e8
-"""Of a whitened residual or sensitivity: a run that flies away counts as enormous, and can still be squared."""
-FINITE = 1e100
-"""Before whitening, which sums."""
 LARGEST_STEP = 0.7
 """Of a logarithm in one step: a factor of 2."""
 ENDED = 0.05
@@ -236,10 +233,11 @@ def residuals(problem: Problem, machine: Machine) -> list[Array]:
     out = []
     for w, (run, _) in zip(problem.record.windows, simulate(problem, machine), strict=True):
         with np.errstate(all="ignore"):
-            rest = problem.noise.white(w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6))
+            left = w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6)
+        rest = problem.noise.white(left[None])[0]
         rest[:EDGE] = 0.0
         rest[-EDGE:] = 0.0
-        out.append(np.clip(rest, -LARGEST, LARGEST))
+        out.append(rest)
     return out
 
 
@@ -260,16 +258,13 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
         ask_for_time()
-        run = np.zeros((len(columns), u, 3))
         own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind in "wx" and c.window == k)]
         by_load = [j for j, c in enumerate(columns) if c.kind == "k" and c.window == k]
-        run[own] = _along_numbers(problem, machine, k, [columns[j] for j in own])
-        if by_load:
-            indices = [columns[j].index for j in by_load]
-            run[by_load] = _along_loads(problem, machine, k, max(indices) + 1)[indices]
-        flown = np.clip(np.nan_to_num(run, copy=False), -FINITE, FINITE, out=run)
-        white = problem.noise.white(flown)
-        np.clip(white, -LARGEST, LARGEST, out=white)
+        knots = [columns[j].index for j in by_load]
+        run = _sensitivities(problem, machine, k, [columns[j] for j in own], max(knots, default=-1) + 1)
+        rows = np.full(len(columns), NO_ROW)
+        rows[own], rows[by_load] = np.arange(len(own)), len(own) + np.array(knots, dtype=np.int64)
+        white = problem.noise.white(run, rows)
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0
@@ -277,8 +272,8 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
-def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence[Column]) -> Array:
-    """(columns, n, 3) of window k: its currents by numbers of the machine and of its own first state."""
+def _sensitivities(problem: Problem, machine: Machine, k: int, columns: Sequence[Column], knots: int) -> Array:
+    """(columns + knots, n, 3) of window k: its currents by numbers of the machine and of its own first state, and by the first knots of its load."""
     slope, w, u = machine.slope(), problem.record.windows[k], problem.until[k]
     dp, dx = np.zeros((len(columns), COUNT)), np.zeros((len(columns), STATES))
     for row, column in enumerate(columns):
@@ -286,21 +281,10 @@ def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence
             dp[row, column.index] = slope[column.index]
         else:
             dx[row, column.index] = 1.0
-    run = np.empty((len(columns), u, 3))
+    run = np.empty((len(columns) + knots, u, 3))
     tangents(
         machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], Directions(dp, dx), w.voltage[: 2 * u - 1],
         w.speed[: 2 * u - 1], machine.load(k, u, problem.period), problem.period, machine.has_shaft, run,
-    )  # fmt: skip
-    return run
-
-
-def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Array:
-    """(count, n, 3) of window k: its currents by the first knots of its load."""
-    w, u = problem.record.windows[k], problem.until[k]
-    run = np.empty((count, u, 3))
-    load_tangents(
-        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
-        machine.load(k, u, problem.period), problem.period, run,
     )  # fmt: skip
     return run
 

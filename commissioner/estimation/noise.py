@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
+
+from commissioner.estimation.kernels.whitening import whiten
 
 Array = NDArray[np.float64]
 ORDER = 30
@@ -25,10 +26,12 @@ class Noise:
     total: float = 0.0
     """Standard deviation of alpha and beta, not whitened, A."""
 
-    def white(self, x: Array) -> Array:
-        """(..., n, 3) -> (..., n, 2 or 3), unit variance where only chance is left."""
-        ab = lfilter(self.coefficients, [1.0], x[..., :2], axis=-2) / self.sigma
-        return np.concatenate([ab, x[..., 2:] / self.zero], axis=-1) if self.has_zero else ab
+    def white(self, x: Array, rows: NDArray[np.int64] | None = None) -> Array:
+        """(C, n, 3) -> (C, n, 2 or 3), unit variance where only chance is left; of these `rows`, none where there is `NO_ROW`."""
+        rows = np.arange(x.shape[0]) if rows is None else rows
+        out = np.empty((rows.size, x.shape[1], 3 if self.has_zero else 2))
+        whiten(x, rows, self.coefficients / self.sigma, 1.0 / self.zero if self.has_zero else 0.0, out)
+        return out
 
 
 def plain_noise(sigma_a: tuple[float, float, float], has_zero: bool) -> Noise:
