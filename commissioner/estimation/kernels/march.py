@@ -56,7 +56,7 @@ DEAD, DEAD_KNEE, V_GAIN, V_OFFSET = AT["dead_voltage"], AT["dead_knee"], AT["vol
 W_GAIN, W_LAG, W_RIPPLE, DELAY = AT["speed_gain"], AT["speed_lag"], AT["speed_ripple_cos"], AT["delay"]
 GAIN, OFFSET, PAIR = AT["current_gain_v"], AT["current_offset_u"], AT["current_pair_u"]
 INERTIA, CONSTANT, LINEAR, FAN = AT["inertia"], AT["load_constant"], AT["load_linear"], AT["load_fan"]
-BREAKAWAY, RIPPLE = AT["load_breakaway"], AT["load_ripple_cos"]
+LOADS, RIPPLE = 8, AT["load_ripple_cos"]
 SLOWEST2, SLOW2 = 1e-5, 1e-3
 """Squares of the shares of synchronous speed over which a friction comes to its full torque, and over which that of breaking away is lost."""
 MOST_FLUX = 6.0
@@ -72,17 +72,20 @@ GAP_STEPS = 4
 
 
 class Load(NamedTuple):
-    """Load torque, of rated torque, between `knots` (m,), at `places` (2n - 1,) among them: at samples and between them."""
+    """Load torque, of rated torque, between `knots` (m,), at `places` among them: at samples and between them (2n - 1,), or where each of a step's stages
+    has its own (3n - 2,), twice between them."""
 
     knots: NDArray[Any]
     places: NDArray[np.float64]
 
 
 class States(NamedTuple):
-    """`before` a sample's step and `after` it, (1 or n, STATES): one and the same row, or one a sample."""
+    """`before` a sample's step and `after` it, (1 or n, STATES): one and the same row, or one a sample. Where there is room (n, 4, 3) `within`: speed,
+    angle and acceleration of the shaft at each stage."""
 
     before: NDArray[Any]
     after: NDArray[Any]
+    within: NDArray[np.float64]
 
 
 class Directions(NamedTuple):
@@ -111,6 +114,18 @@ def _cos_sin(z):
     """Cosine and sine, to the same order."""
     c, s = np.cos(z.real), np.sin(z.real)
     return c - s * (z - z.real), s + c * (z - z.real)
+
+
+@_inlined
+def _load_laws(share, angle, has_ripple):
+    """What the LOADS numbers from `load_constant` on are multiplied with in the load; `share` of synchronous speed, `angle` of the shaft."""
+    dry = share * _per(_root(share * share + SLOWEST2))
+    size = share if share.real > 0.0 else -share
+    c, s = 0.0 * share, 0.0 * share
+    if has_ripple:
+        c, s = _cos_sin(angle)
+    once = SLOW2 * _per(share * share + SLOW2)
+    return dry, share, share * size, dry * once, dry * c, dry * s, dry * (c * c - s * s), dry * 2.0 * s * c
 
 
 @_inlined
@@ -156,15 +171,16 @@ def march(p, scales, x, voltage, speed, load_torque, period, is_free, out, shaft
     `x` is the state at the first sample and is overwritten. Types follow `p`.
     """
     own = x.reshape((1, STATES))
-    _steps(p, scales, States(own, own), voltage, speed, load_torque, period, is_free, out, shaft)
+    states = States(own, own, np.empty((0, 4, 3)))
+    _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out, shaft)
     _chain(p, scales[0], period, out)
 
 
 @_kernel
 def _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out, shaft):
     """As `march`, the machine's own currents alone: alpha, beta. Of `states` one row goes from sample to sample, or each sample has its own."""
-    before, after = states.before, states.after
-    is_each = before.shape[0] > 1
+    before, after, within = states.before, states.after, states.within
+    is_each, has_own_loads = before.shape[0] > 1, load_torque.places.shape[0] > 2 * out.shape[0] - 1
     knots, places = load_torque.knots, load_torque.places
     current, volt, w_n, torque_n, pairs, holds = scales
     flux2 = 1.0 / (volt / w_n) ** 2
@@ -332,18 +348,17 @@ def _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out,
             if is_free:
                 torque = 1.5 * pairs * (y[3] * ra - y[2] * rb)
                 share = w * per_w
-                low = min(int(places[m]), knots.shape[0] - 2)
-                part = places[m] - low
+                place = places[3 * q + stage if has_own_loads else m]
+                low = min(int(place), knots.shape[0] - 2)
+                part = place - low
                 load = knots[low] * (1.0 - part) + knots[low + 1] * part
-                turning = p[CONSTANT] + p[BREAKAWAY] * SLOW2 * _per(share * share + SLOW2)
-                if has_load_ripple:
-                    c, s = _cos_sin(y[9] * per_pairs)
-                    turning += p[RIPPLE] * c + p[RIPPLE + 1] * s
-                    turning += p[RIPPLE + 2] * (c * c - s * s) + p[RIPPLE + 3] * 2.0 * s * c
-                size = share if share.real > 0.0 else -share
-                load += turning * share * _per(_root(share * share + SLOWEST2)) + share * (p[LINEAR] + p[FAN] * size)
+                laws = _load_laws(share, y[9] * per_pairs, has_load_ripple)
+                for j in range(LOADS if has_load_ripple else LOADS - 4):
+                    load += p[CONSTANT + j] * laws[j]
                 k[stage, 8] = per_inertia * (torque - torque_n * load)
             k[stage, 9] = w
+            if within.shape[0] > 0:
+                within[q, stage, 0], within[q, stage, 1], within[q, stage, 2] = w.real, y[9].real, k[stage, 8].real
         if q < n - 1:
             for j in range(STATES):
                 after[at, j] = before[at, j] + h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
@@ -385,8 +400,8 @@ def _chain(p, current, period, out):
 
 
 class Moves(NamedTuple):
-    """Of each step of a block what moves what: the state at its end (B, STATES, ...) by that at its begin, by numbers, by the load at begin,
-    middle and end; the current (B, 2, ...) by state and by numbers."""
+    """Of each step of a block what moves what: the state at its end (B, STATES, ...) by that at its begin, by numbers, by the load at its
+    four stages; the current (B, 2, ...) by state and by numbers."""
 
     to_state: NDArray[np.float64]
     by_number: NDArray[np.float64]
@@ -411,15 +426,16 @@ def _moving(p, period, is_free, w_n):
 
 @_kernel
 def _moves(p, scales, path, numbers, voltage, speed, load, period, is_free, moves):
-    """`moves` of the block whose states are `path` (B, STATES), along every state that moves and the `numbers` (P, COUNT). `load` (2B - 1,): at
-    its samples and between them."""
+    """`moves` of the block whose states are `path` (B, STATES), along every state that moves and the `numbers` (P, COUNT). `load` (3B - 2,): at
+    the stages of its steps."""
     count = path.shape[0]
     is_moving = _moving(p, period, is_free, scales[2])
     before, after = np.empty((count, STATES), dtype=np.complex128), np.empty((count, STATES), dtype=np.complex128)
     run, shaft = np.empty((count, 3), dtype=np.complex128), np.empty((count, 2), dtype=np.complex128)
-    places = np.arange(2 * count - 1) * 1.0
+    places = np.arange(3 * count - 2) * 1.0
     many = numbers.shape[0]
-    for c in range(STATES + many + (3 if is_free else 0)):
+    moves.by_number[:] = 0.0
+    for c in range(STATES + many + (4 if is_free else 0)):
         if c < STATES and not is_moving[c]:
             continue
         moved, level = p + 0j, load + 0j
@@ -433,10 +449,21 @@ def _moves(p, scales, path, numbers, voltage, speed, load, period, is_free, move
             if not numbers[c - STATES].any():
                 continue
             moved += 1j * STEP * numbers[c - STATES]
-        else:  # one step begins where another ends: every other of these, the others, what lies between
-            first = (0, 2, 1)[c - STATES - many]
-            level[first :: (4 if first != 1 else 2)] += 1j * STEP
-        _steps(moved, scales, States(before, after), voltage, speed, Load(level, places), period, is_free, run, shaft)
+        else:  # one step begins where another ends: every other of these, the others, twice what lies between
+            first = (0, 3, 1, 2)[c - STATES - many]
+            level[first :: (6 if first % 3 == 0 else 3)] += 1j * STEP
+        _steps(
+            moved,
+            scales,
+            States(before, after, np.empty((0, 4, 3))),
+            voltage,
+            speed,
+            Load(level, places),
+            period,
+            is_free,
+            run,
+            shaft,
+        )
         for q in range(count):
             if c < STATES:
                 moves.to_current[q, 0, c], moves.to_current[q, 1, c] = run[q, 0].imag / STEP, run[q, 1].imag / STEP
@@ -451,10 +478,10 @@ def _moves(p, scales, path, numbers, voltage, speed, load, period, is_free, move
                     moves.to_state[q, i, c] = by
                 elif c < STATES + many:
                     moves.by_number[q, i, c - STATES] = by
-                elif c == STATES + many + 2:
-                    moves.by_load[q, i, 1] = by
+                elif c >= STATES + many + 2:
+                    moves.by_load[q, i, c - STATES - many - 1] = by
                 else:
-                    moves.by_load[q, i, 0 if (q % 2 == 0) == (c == STATES + many) else 2] = by
+                    moves.by_load[q, i, 0 if (q % 2 == 0) == (c == STATES + many) else 3] = by
     return is_moving
 
 
@@ -473,16 +500,18 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         for c in range(many):
             is_seen[c] = is_seen[c] or numbers[c, first : first + width].any()
             numbers[c, first : first + width] = 0.0
+    torques = numbers[:, INERTIA : INERTIA + 1 + LOADS].copy()  # these move the shaft alone
+    numbers[:, INERTIA : INERTIA + 1 + LOADS] = 0.0
     whole = bare + 0j  # a state that only a number moves which is zero is on the path too
     for c in range(many):
         whole += 1j * STEP * np.abs(numbers[c])
     size = min(n, BLOCK)
     moves = Moves(
-        np.zeros((size, STATES, STATES)), np.zeros((size, STATES, many)), np.zeros((size, STATES, 3)),
+        np.zeros((size, STATES, STATES)), np.zeros((size, STATES, many)), np.zeros((size, STATES, 4)),
         np.zeros((size, 2, STATES)), np.zeros((size, 2, many)),
     )  # fmt: skip
     path, own, shaft = np.zeros((size, STATES), dtype=np.complex128), np.empty((n, 3)), np.empty((size, 2)) + 0j
-    run, load = np.empty((size, 3)) + 0j, np.zeros(2 * size - 1)
+    run, load, within = np.empty((size, 3)) + 0j, np.zeros(3 * size - 2), np.empty((size, 4, 3))
     shown = np.zeros((size, 2, out.shape[0]))
     moved, ahead = np.zeros((STATES, out.shape[0])), np.zeros((STATES, out.shape[0]))
     moved[:, :many] = along.dx.T
@@ -491,20 +520,23 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
     while True:
         count = min(size, n - begin)
         rows, between = slice(begin, begin + count), slice(2 * begin, 2 * (begin + count) - 1)
-        volts, speeds, level = voltage[between], speed[between], load[: 2 * count - 1]
+        volts, speeds, level = voltage[between], speed[between], load[: 3 * count - 2]
         if is_free:
-            for m in range(2 * count - 1):
-                low = min(int(places[2 * begin + m]), knots.shape[0] - 2)
-                part = places[2 * begin + m] - low
+            for m in range(3 * count - 2):
+                place = places[2 * (begin + m // 3) + min(m % 3, 1)]
+                low = min(int(place), knots.shape[0] - 2)
+                part = place - low
                 level[m] = knots[low] * (1.0 - part) + knots[low + 1] * part
         first = path[0].copy()
         _steps(
-            whole, scales, States(path[:count], path[1:count]), volts, speeds,
-            Load(level + 0j, np.arange(2 * count - 1) * 1.0), period, is_free, run[:count], shaft[:count],
+            whole, scales, States(path[:count], path[1:count], within), volts, speeds,
+            Load(level + 0j, np.arange(3 * count - 2) * 1.0), period, is_free, run[:count], shaft[:count],
         )  # fmt: skip
         path[0] = first  # as it was given, where nothing was known of it
         own[rows] = run[:count].real
         is_moving = _moves(bare, scales, path[:count].real, numbers, volts, speeds, level, period, is_free, moves)
+        if is_free:
+            _by_torques(torques, within, scales, count, moves)
         for q in range(count):
             for e in range(2):
                 row = shown[q, e]
@@ -520,8 +552,8 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
                 break
             _move(moves, q, is_moving, moved, ahead, begun)
             if is_free:
-                for m in range(3):
-                    place = places[2 * (begin + q) + m]
+                for m in range(4):
+                    place = places[2 * (begin + q) + (m + 1) // 2]
                     low = min(int(place), knots.shape[0] - 2)
                     for k in range(low, min(low + 2, out.shape[0] - many)):
                         part = place - low if k > low else 1.0 - (place - low)
@@ -537,6 +569,23 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         begin += count - 1
         path[0] = path[count - 1].real
     _shown(p, scales[0], period, along.dp, is_seen, own, out)
+
+
+@_inlined
+def _by_torques(torques, within, scales, count, moves):
+    """Numbers of the inertia and the load move the state as a load at the four stages does. `torques` (P, 1 + LOADS)."""
+    w_n, torque_n, pairs = scales[2], scales[3], scales[4]
+    for q in range(count - 1):
+        for stage in range(4):
+            w, angle, faster = within[q, stage, 0], within[q, stage, 1], within[q, stage, 2]
+            laws = _load_laws(w / w_n, angle / pairs, True)
+            for c in range(torques.shape[0]):
+                load = torques[c, 0] * faster / (pairs * torque_n)
+                for j in range(LOADS):
+                    load += torques[c, 1 + j] * laws[j]
+                if load != 0.0:
+                    for i in range(STATES):
+                        moves.by_number[q, i, c] += load * moves.by_load[q, i, stage]
 
 
 @_inlined
