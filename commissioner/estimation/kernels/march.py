@@ -117,15 +117,19 @@ def _cos_sin(z):
 
 
 @_inlined
-def _load_laws(share, angle, has_ripple):
-    """What the LOADS numbers from `load_constant` on are multiplied with in the load; `share` of synchronous speed, `angle` of the shaft."""
-    dry = share * _per(_root(share * share + SLOWEST2))
+def _friction_laws(share):
+    """What the four numbers from `load_constant` on are multiplied with in the load; `share` of synchronous speed."""
+    square = share * share
+    dry = share * _per(_root(square + SLOWEST2))
     size = share if share.real > 0.0 else -share
-    c, s = 0.0 * share, 0.0 * share
-    if has_ripple:
-        c, s = _cos_sin(angle)
-    once = SLOW2 * _per(share * share + SLOW2)
-    return dry, share, share * size, dry * once, dry * c, dry * s, dry * (c * c - s * s), dry * 2.0 * s * c
+    return dry, share, share * size, dry * SLOW2 * _per(square + SLOW2)
+
+
+@_inlined
+def _ripple_laws(dry, angle):
+    """The same of the four from `load_ripple_cos` on; `dry` of friction, `angle` of the shaft."""
+    c, s = _cos_sin(angle)
+    return dry * c, dry * s, dry * (c * c - s * s), dry * 2.0 * s * c
 
 
 @_inlined
@@ -352,9 +356,13 @@ def _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out,
                 low = min(int(place), knots.shape[0] - 2)
                 part = place - low
                 load = knots[low] * (1.0 - part) + knots[low + 1] * part
-                laws = _load_laws(share, y[9] * per_pairs, has_load_ripple)
-                for j in range(LOADS if has_load_ripple else LOADS - 4):
-                    load += p[CONSTANT + j] * laws[j]
+                dry, linear, fan, breaking = _friction_laws(share)
+                load += (
+                    p[CONSTANT] * dry + p[CONSTANT + 1] * linear + p[CONSTANT + 2] * fan + p[CONSTANT + 3] * breaking
+                )
+                if has_load_ripple:
+                    c, s, cc, ss = _ripple_laws(dry, y[9] * per_pairs)
+                    load += p[RIPPLE] * c + p[RIPPLE + 1] * s + p[RIPPLE + 2] * cc + p[RIPPLE + 3] * ss
                 k[stage, 8] = per_inertia * (torque - torque_n * load)
             k[stage, 9] = w
             if within.shape[0] > 0:
@@ -575,17 +583,23 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
 def _by_torques(torques, within, scales, count, moves):
     """Numbers of the inertia and the load move the state as a load at the four stages does. `torques` (P, 1 + LOADS)."""
     w_n, torque_n, pairs = scales[2], scales[3], scales[4]
-    for q in range(count - 1):
+    free, laws = np.empty(torques.shape[0], dtype=np.int64), np.empty(1 + LOADS)
+    many = 0
+    for c in range(torques.shape[0]):
+        if torques[c].any():
+            free[many] = c
+            many += 1
+    for q in range(count - 1 if many else 0):
         for stage in range(4):
-            w, angle, faster = within[q, stage, 0], within[q, stage, 1], within[q, stage, 2]
-            laws = _load_laws(w / w_n, angle / pairs, True)
-            for c in range(torques.shape[0]):
-                load = torques[c, 0] * faster / (pairs * torque_n)
-                for j in range(LOADS):
-                    load += torques[c, 1 + j] * laws[j]
-                if load != 0.0:
-                    for i in range(STATES):
-                        moves.by_number[q, i, c] += load * moves.by_load[q, i, stage]
+            laws[0] = within[q, stage, 2] / (pairs * torque_n)
+            laws[1], laws[2], laws[3], laws[4] = _friction_laws(within[q, stage, 0] / w_n)
+            laws[5], laws[6], laws[7], laws[8] = _ripple_laws(laws[1], within[q, stage, 1] / pairs)
+            for c in free[:many]:
+                load = 0.0
+                for j in range(1 + LOADS):
+                    load += torques[c, j] * laws[j]
+                for i in range(STATES):
+                    moves.by_number[q, i, c] += load * moves.by_load[q, i, stage]
 
 
 @_inlined
