@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
 from commissioner.estimation.record import Record, Window, first_part
-from commissioner.estimation.told import Told, inverse, told
+from commissioner.estimation.told import Slopes, Told, told
 
 Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
@@ -291,7 +292,7 @@ def _sensitivities(problem: Problem, machine: Machine, k: int, columns: Sequence
 
 @dataclass(frozen=True)
 class Fit:
-    """`rest`: whitened residual of the fitted part, `jacobian` where it ended (columns, samples); `held`: chi-square of the held-out part.
+    """`rest`: whitened residual of the fitted part, `slopes` where it ended; `held`: chi-square of the held-out part.
     `by_noise`: what the input's noise makes of the Jacobian's Gram matrix, `aside` (k, columns): by how much it may draw them aside besides; both from
     `unbiased`, nothing before."""
 
@@ -299,11 +300,16 @@ class Fit:
     columns: tuple[Column, ...]
     chi2: float
     rest: Array
-    jacobian: Array
+    slopes: Slopes
     held: float
     held_count: int
     by_noise: Array | float = 0.0
     aside: Array | float = 0.0
+
+    @property
+    def jacobian(self) -> Array:
+        """Whitened sensitivities (columns, samples)."""
+        return self.slopes.jacobian
 
     @property
     def count(self) -> int:
@@ -317,7 +323,7 @@ class Fit:
 
     def influence(self) -> Array:
         """By how much of its number each column's gradient moves the fit: the inverse of the Gram matrix."""
-        return inverse(self.jacobian @ self.jacobian.T)
+        return self.slopes.influence
 
     def covariance(self) -> Array:
         """Of the columns' numbers in fit coordinates, widened by what is left."""
@@ -331,9 +337,12 @@ class Fit:
     def told(self) -> Told:
         """What the sensitivities tell of the columns' numbers, nothing else left. An open direction along which none of the four numbers
         is wide (the inertia that a load's ripple tells) is as far off as any other."""
-        gram = self.jacobian @ self.jacobian.T
-        whole = told(gram, self.by_noise)
-        return whole if self._opened(whole) else told(gram, 0.0)
+        return self._told
+
+    @cached_property
+    def _told(self) -> Told:
+        whole = told(self.slopes.gram, self.by_noise)
+        return whole if self._opened(whole) else told(self.slopes.gram, 0.0)
 
     def _opened(self, whole: Told) -> tuple[str, ...]:
         reach = np.sqrt(whole.open.diagonal())
@@ -456,11 +465,13 @@ def refine(
         else:
             damping = max(10.0 * damping, 1e-3)
     if known is None or (is_final and not is_fresh):
-        known = _Sensitivity(jacobian(problem, machine, columns))
+        slopes = Slopes(lambda: jacobian(problem, machine, columns))
+    else:
+        slopes = Slopes.known(known.jacobian)
     held = held_part(problem, parts)
-    return Fit(machine, tuple(columns), chi2, rest, known.jacobian, float(held @ held), int(held.size))
+    return Fit(machine, tuple(columns), chi2, rest, slopes, float(held @ held), int(held.size))
 
 
 def refreshed(problem: Problem, fit: Fit) -> Fit:
     """The same fit with the Jacobian of where it ended."""
-    return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
+    return replace(fit, slopes=Slopes(lambda: jacobian(problem, fit.machine, fit.columns)))

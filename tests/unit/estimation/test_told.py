@@ -7,7 +7,7 @@ from commissioner.estimation.fit import Column, Fit, Machine
 from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import AT
 from commissioner.estimation.numbers import COUNT as NUMBERS
-from commissioner.estimation.told import inverse, told
+from commissioner.estimation.told import Slopes, inverse, told
 
 RNG = np.random.default_rng(3)
 COUNT, SIGMA = 400, 0.1
@@ -64,5 +64,5 @@ def test_a_long_recording_does_not_tell_what_only_its_noise_does(along: tuple[fl
     machine = Machine(
         np.zeros(NUMBERS), np.zeros((1, STATES)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, NUMBERS))
     )
-    fit = Fit(machine, columns, 3.0, np.ones(3), jacobian, 0.0, 0, by_noise)
+    fit = Fit(machine, columns, 3.0, np.ones(3), Slopes.known(jacobian), 0.0, 0, by_noise)
     assert set(fit.not_told()) == opened
