@@ -80,12 +80,14 @@ class Load(NamedTuple):
 
 
 class States(NamedTuple):
-    """`before` a sample's step and `after` it, (1 or n, STATES): one and the same row, or one a sample. Where there is room (n, 4, 3) `within`: speed,
-    angle and acceleration of the shaft at each stage."""
+    """`before` a sample's step and `after` it, (1 or n, STATES): one and the same row, or one a sample. Where there is room (n, 4, 6) `within`, at each
+    stage: speed, angle and acceleration of the shaft, torque of the load's laws, its derivatives by speed and angle; `is_known`: there already, so
+    that the laws are straight lines."""
 
     before: NDArray[Any]
     after: NDArray[Any]
     within: NDArray[np.float64]
+    is_known: bool
 
 
 class Directions(NamedTuple):
@@ -133,6 +135,17 @@ def _ripple_laws(dry, angle):
 
 
 @_inlined
+def _by_laws(p, share, angle, has_ripple):
+    """Torque of friction, fan and ripple, of rated torque."""
+    dry, linear, fan, breaking = _friction_laws(share)
+    load = p[CONSTANT] * dry + p[CONSTANT + 1] * linear + p[CONSTANT + 2] * fan + p[CONSTANT + 3] * breaking
+    if has_ripple:
+        c, s, cc, ss = _ripple_laws(dry, angle)
+        load += p[RIPPLE] * c + p[RIPPLE + 1] * s + p[RIPPLE + 2] * cc + p[RIPPLE + 3] * ss
+    return load
+
+
+@_inlined
 def _gap_current(p, both, z0):
     """Extra magnetizing current over psi_0 / L_M, of the flux of the air gap; `z0`: square of psi_0 over rated flux; `both`: k (1 - k).
 
@@ -175,7 +188,7 @@ def march(p, scales, x, voltage, speed, load_torque, period, is_free, out, shaft
     `x` is the state at the first sample and is overwritten. Types follow `p`.
     """
     own = x.reshape((1, STATES))
-    states = States(own, own, np.empty((0, 4, 3)))
+    states = States(own, own, np.empty((0, 4, 6)), False)
     _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out, shaft)
     _chain(p, scales[0], period, out)
 
@@ -356,17 +369,23 @@ def _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out,
                 low = min(int(place), knots.shape[0] - 2)
                 part = place - low
                 load = knots[low] * (1.0 - part) + knots[low + 1] * part
-                dry, linear, fan, breaking = _friction_laws(share)
-                load += (
-                    p[CONSTANT] * dry + p[CONSTANT + 1] * linear + p[CONSTANT + 2] * fan + p[CONSTANT + 3] * breaking
-                )
-                if has_load_ripple:
-                    c, s, cc, ss = _ripple_laws(dry, y[9] * per_pairs)
-                    load += p[RIPPLE] * c + p[RIPPLE + 1] * s + p[RIPPLE + 2] * cc + p[RIPPLE + 3] * ss
+                if states.is_known:
+                    load += within[q, stage, 3] + within[q, stage, 4] * (w - within[q, stage, 0])
+                    load += within[q, stage, 5] * (y[9] - within[q, stage, 1])
+                else:
+                    load += _by_laws(p, share, y[9] * per_pairs, has_load_ripple)
                 k[stage, 8] = per_inertia * (torque - torque_n * load)
             k[stage, 9] = w
-            if within.shape[0] > 0:
+            if within.shape[0] > 0 and not states.is_known:
                 within[q, stage, 0], within[q, stage, 1], within[q, stage, 2] = w.real, y[9].real, k[stage, 8].real
+                share, angle = w.real * per_w + 1j * STEP, y[9].real * per_pairs + 1j * STEP
+                by_share = _by_laws(p, share, angle.real + 0j, has_load_ripple)
+                by_angle = _by_laws(p, share.real + 0j, angle, has_load_ripple)
+                within[q, stage, 3] = by_share.real
+                within[q, stage, 4], within[q, stage, 5] = (
+                    by_share.imag / STEP * per_w,
+                    by_angle.imag / STEP * per_pairs,
+                )
         if q < n - 1:
             for j in range(STATES):
                 after[at, j] = before[at, j] + h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
@@ -418,6 +437,12 @@ class Moves(NamedTuple):
     on_current: NDArray[np.float64]
 
 
+@_inlined
+def _turns_load_alone(p, is_free):
+    """Whether the angle does nothing but move the load."""
+    return is_free and p[CAGE] == 0.0 and p[CAGE + 1] == 0.0
+
+
 @_kernel
 def _moving(p, period, is_free, w_n):
     """(STATES,): which states move at all and anything with them."""
@@ -433,23 +458,23 @@ def _moving(p, period, is_free, w_n):
 
 
 @_kernel
-def _moves(p, scales, path, numbers, voltage, speed, load, period, is_free, moves):
-    """`moves` of the block whose states are `path` (B, STATES), along every state that moves and the `numbers` (P, COUNT). `load` (3B - 2,): at
+def _moves(p, scales, states, numbers, voltage, speed, load, period, is_free, moves):
+    """`moves` of the block that goes through `states` (before: B, STATES), along every state that moves and the `numbers` (P, COUNT). `load` (3B - 2,): at
     the stages of its steps."""
-    count = path.shape[0]
+    count, path = states.before.shape[0], states.before
     is_moving = _moving(p, period, is_free, scales[2])
     before, after = np.empty((count, STATES), dtype=np.complex128), np.empty((count, STATES), dtype=np.complex128)
     run, shaft = np.empty((count, 3), dtype=np.complex128), np.empty((count, 2), dtype=np.complex128)
-    places = np.arange(3 * count - 2) * 1.0
+    places, is_by_load = np.arange(3 * count - 2) * 1.0, _turns_load_alone(p, is_free)
     many = numbers.shape[0]
     moves.by_number[:] = 0.0
     for c in range(STATES + many + (4 if is_free else 0)):
-        if c < STATES and not is_moving[c]:
+        if c < STATES and (not is_moving[c] or (c == 9 and is_by_load)):
             continue
         moved, level = p + 0j, load + 0j
         for q in range(count):
             for i in range(STATES):
-                before[q, i] = path[q, i]
+                before[q, i] = path[q, i].real
         if c < STATES:
             for q in range(count):
                 before[q, c] += 1j * STEP
@@ -463,7 +488,7 @@ def _moves(p, scales, path, numbers, voltage, speed, load, period, is_free, move
         _steps(
             moved,
             scales,
-            States(before, after, np.empty((0, 4, 3))),
+            States(before, after, states.within, is_free),
             voltage,
             speed,
             Load(level, places),
@@ -519,7 +544,7 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         np.zeros((size, 2, STATES)), np.zeros((size, 2, many)),
     )  # fmt: skip
     path, own, shaft = np.zeros((size, STATES), dtype=np.complex128), np.empty((n, 3)), np.empty((size, 2)) + 0j
-    run, load, within = np.empty((size, 3)) + 0j, np.zeros(3 * size - 2), np.empty((size, 4, 3))
+    run, load, within = np.empty((size, 3)) + 0j, np.zeros(3 * size - 2), np.empty((size, 4, 6))
     shown = np.zeros((size, 2, out.shape[0]))
     moved, ahead = np.zeros((STATES, out.shape[0])), np.zeros((STATES, out.shape[0]))
     moved[:, :many] = along.dx.T
@@ -537,14 +562,27 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
                 level[m] = knots[low] * (1.0 - part) + knots[low + 1] * part
         first = path[0].copy()
         _steps(
-            whole, scales, States(path[:count], path[1:count], within), volts, speeds,
+            whole, scales, States(path[:count], path[1:count], within, False), volts, speeds,
             Load(level + 0j, np.arange(3 * count - 2) * 1.0), period, is_free, run[:count], shaft[:count],
         )  # fmt: skip
         path[0] = first  # as it was given, where nothing was known of it
         own[rows] = run[:count].real
-        is_moving = _moves(bare, scales, path[:count].real, numbers, volts, speeds, level, period, is_free, moves)
+        is_moving = _moves(
+            bare,
+            scales,
+            States(path[:count], path, within, False),
+            numbers,
+            volts,
+            speeds,
+            level,
+            period,
+            is_free,
+            moves,
+        )
         if is_free:
-            _by_torques(torques, within, scales, count, moves)
+            _by_shaft(torques, within, scales, count, moves)
+            if _turns_load_alone(bare, is_free):
+                _by_angle(within, count, moves)
         for q in range(count):
             for e in range(2):
                 row = shown[q, e]
@@ -580,7 +618,7 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
 
 
 @_inlined
-def _by_torques(torques, within, scales, count, moves):
+def _by_shaft(torques, within, scales, count, moves):
     """Numbers of the inertia and the load move the state as a load at the four stages does. `torques` (P, 1 + LOADS)."""
     w_n, torque_n, pairs = scales[2], scales[3], scales[4]
     free, laws = np.empty(torques.shape[0], dtype=np.int64), np.empty(1 + LOADS)
@@ -600,6 +638,16 @@ def _by_torques(torques, within, scales, count, moves):
                     load += torques[c, j] * laws[j]
                 for i in range(STATES):
                     moves.by_number[q, i, c] += load * moves.by_load[q, i, stage]
+
+
+@_inlined
+def _by_angle(within, count, moves):
+    """The angle moves the state as a load does."""
+    for q in range(count - 1):
+        for i in range(STATES):
+            moves.to_state[q, i, 9] = 1.0 if i == 9 else 0.0
+            for stage in range(4):
+                moves.to_state[q, i, 9] += within[q, stage, 5] * moves.by_load[q, i, stage]
 
 
 @_inlined
