@@ -378,14 +378,6 @@ def _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out,
             k[stage, 9] = w
             if within.shape[0] > 0 and not states.is_known:
                 within[q, stage, 0], within[q, stage, 1], within[q, stage, 2] = w.real, y[9].real, k[stage, 8].real
-                share, angle = w.real * per_w + 1j * STEP, y[9].real * per_pairs + 1j * STEP
-                by_share = _by_laws(p, share, angle.real + 0j, has_load_ripple)
-                by_angle = _by_laws(p, share.real + 0j, angle, has_load_ripple)
-                within[q, stage, 3] = by_share.real
-                within[q, stage, 4], within[q, stage, 5] = (
-                    by_share.imag / STEP * per_w,
-                    by_angle.imag / STEP * per_pairs,
-                )
         if q < n - 1:
             for j in range(STATES):
                 after[at, j] = before[at, j] + h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
@@ -488,7 +480,7 @@ def _moves(p, scales, states, numbers, voltage, speed, load, period, is_free, mo
         _steps(
             moved,
             scales,
-            States(before, after, states.within, is_free),
+            States(before, after, states.within, True),
             voltage,
             speed,
             Load(level, places),
@@ -565,6 +557,8 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
             whole, scales, States(path[:count], path[1:count], within, False), volts, speeds,
             Load(level + 0j, np.arange(3 * count - 2) * 1.0), period, is_free, run[:count], shaft[:count],
         )  # fmt: skip
+        if is_free:
+            _as_lines(bare, scales, within[: count - 1])
         path[0] = first  # as it was given, where nothing was known of it
         own[rows] = run[:count].real
         is_moving = _moves(
@@ -615,6 +609,20 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         begin += count - 1
         path[0] = path[count - 1].real
     _shown(p, scales[0], period, along.dp, is_seen, own, out)
+
+
+@_kernel
+def _as_lines(p, scales, within):
+    """The laws of the load along a path, and by what they change with speed and angle."""
+    per_w, per_pairs = 1.0 / scales[2], 1.0 / scales[4]
+    has_ripple = p[RIPPLE : RIPPLE + 4].any()
+    for q in range(within.shape[0]):
+        for stage in range(4):
+            at = within[q, stage]
+            share, angle = at[0] * per_w + 1j * STEP, at[1] * per_pairs + 1j * STEP
+            by_share = _by_laws(p, share, angle.real + 0j, has_ripple)
+            by_angle = _by_laws(p, share.real + 0j, angle, has_ripple)
+            at[3], at[4], at[5] = by_share.real, by_share.imag / STEP * per_w, by_angle.imag / STEP * per_pairs
 
 
 @_inlined
