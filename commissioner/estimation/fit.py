@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
-from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, march, tangents
-from commissioner.estimation.kernels.whitening import NO_ROW
+from commissioner.estimation.kernels.march import NO_ROW, STATES, UNSET, Directions, Load, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
@@ -235,7 +234,8 @@ def residuals(problem: Problem, machine: Machine) -> list[Array]:
     for w, (run, _) in zip(problem.record.windows, simulate(problem, machine), strict=True):
         with np.errstate(all="ignore"):
             left = w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6)
-        rest = problem.noise.white(left[None])[0]
+        rest = left[:, : problem.noise.channels].copy()
+        problem.noise.whiten(rest[None])
         rest[:EDGE] = 0.0
         rest[-EDGE:] = 0.0
         out.append(rest)
@@ -262,10 +262,13 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
         own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind in "wx" and c.window == k)]
         by_load = [j for j, c in enumerate(columns) if c.kind == "k" and c.window == k]
         knots = [columns[j].index for j in by_load]
-        run = _sensitivities(problem, machine, k, [columns[j] for j in own], max(knots, default=-1) + 1)
-        rows = np.full(len(columns), NO_ROW)
-        rows[own], rows[by_load] = np.arange(len(own)), len(own) + np.array(knots, dtype=np.int64)
-        white = problem.noise.white(run, rows)
+        rows = np.full(len(own) + max(knots, default=-1) + 1, NO_ROW)
+        rows[: len(own)] = own
+        rows[len(own) + np.array(knots, dtype=np.int64)] = by_load
+        white = np.empty((len(columns), u, problem.noise.channels))
+        white[sorted({*range(len(columns))} - {*own, *by_load})] = 0.0
+        _sensitivities(problem, machine, k, columns, rows, white)
+        problem.noise.whiten(white)
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0
@@ -273,21 +276,23 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
-def _sensitivities(problem: Problem, machine: Machine, k: int, columns: Sequence[Column], knots: int) -> Array:
-    """(columns + knots, n, 3) of window k: its currents by numbers of the machine and of its own first state, and by the first knots of its load."""
+def _sensitivities(
+    problem: Problem, machine: Machine, k: int, columns: Sequence[Column], rows: NDArray[np.int64], out: Array
+) -> None:
+    """Currents of window k by the numbers of the machine and of its own first state, and by the first knots of its load, into their `rows` of
+    `out` (columns, n, channels)."""
     slope, w, u = machine.slope(), problem.record.windows[k], problem.until[k]
-    dp, dx = np.zeros((len(columns), COUNT)), np.zeros((len(columns), STATES))
-    for row, column in enumerate(columns):
+    numbers = sum(c.kind == "p" or (c.kind in "wx" and c.window == k) for c in columns)
+    dp, dx = np.zeros((numbers, COUNT)), np.zeros((numbers, STATES))
+    for row, column in enumerate(columns[j] for j in rows[:numbers]):
         if column.kind in "pw":
             dp[row, column.index] = slope[column.index]
         else:
             dx[row, column.index] = 1.0
-    run = np.empty((len(columns) + knots, u, 3))
     tangents(
-        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], Directions(dp, dx), w.voltage[: 2 * u - 1],
-        w.speed[: 2 * u - 1], machine.load(k, u, problem.period), problem.period, machine.has_shaft, run,
+        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], Directions(dp, dx, rows), w.voltage[: 2 * u - 1],
+        w.speed[: 2 * u - 1], machine.load(k, u, problem.period), problem.period, machine.has_shaft, out,
     )  # fmt: skip
-    return run
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,14 @@ class Noise:
     total: float = 0.0
     """Standard deviation of alpha and beta, not whitened, A."""
 
-    def white(self, x: Array, rows: NDArray[np.int64] | None = None) -> Array:
-        """(C, n, 3) -> (C, n, 2 or 3), unit variance where only chance is left; of these `rows`, none where there is `NO_ROW`."""
-        rows = np.arange(x.shape[0]) if rows is None else rows
-        out = np.empty((rows.size, x.shape[1], 3 if self.has_zero else 2))
-        whiten(x, rows, self.coefficients / self.sigma, 1.0 / self.zero if self.has_zero else 0.0, out)
-        return out
+    @property
+    def channels(self) -> int:
+        """Of a current that is whitened: alpha, beta, and the zero sequence where there is one."""
+        return 3 if self.has_zero else 2
+
+    def whiten(self, x: Array) -> None:
+        """(C, n, channels) in place: unit variance where only chance is left."""
+        whiten(x, self.coefficients / self.sigma, 1.0 / self.zero if self.has_zero else 0.0)
 
 
 def plain_noise(sigma_a: tuple[float, float, float], has_zero: bool) -> Noise:

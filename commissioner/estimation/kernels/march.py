@@ -91,10 +91,16 @@ class States(NamedTuple):
 
 
 class Directions(NamedTuple):
-    """Along which derivatives are taken: of the parameters (C, ...) and of the first state (C, STATES)."""
+    """Along which derivatives are taken: of the parameters (C, ...) and of the first state (C, STATES), and then along the first knots of the load.
+    `rows` (C + knots,): where each of them is told, or `NO_ROW`."""
 
     dp: NDArray[np.float64]
     dx: NDArray[np.float64]
+    rows: NDArray[np.int64]
+
+
+NO_ROW = -1
+"""Of a direction that nobody asks for."""
 
 
 @_inlined
@@ -415,7 +421,8 @@ def _chain(p, current, period, out):
         w = iw * (1.0 + gw) + ow + no_v * iw - no_u * iw + no_w * (iv - iu)
         out[q, 0] = (2.0 * u - v - w) * (1.0 / 3.0)
         out[q, 1] = (v - w) * (HALF_3 * 2.0 / 3.0)
-        out[q, 2] = (u + v + w) * (1.0 / 3.0)
+        if out.shape[1] > 2:
+            out[q, 2] = (u + v + w) * (1.0 / 3.0)
 
 
 class Moves(NamedTuple):
@@ -512,13 +519,13 @@ def _moves(p, scales, states, numbers, voltage, speed, load, period, is_free, mo
 
 @_kernel
 def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free, out):
-    """Derivatives `along` C directions and then along the first knots of the load; `out` (C + knots, n, 3).
+    """Derivatives `along` directions into their rows of `out` (R, n, 2 or 3: alpha, beta, and zero where it is asked for).
 
     What moves is one linear machine whose numbers change from sample to sample. These are computed once, by a complex step from each state of
     the path and along each number; every direction goes through that machine.
     """
     knots, places = load_torque.knots, load_torque.places
-    n, many = out.shape[1], along.dp.shape[0]
+    n, many, all_ = out.shape[1], along.dp.shape[0], along.rows.size
     bare, numbers, is_seen = p.copy(), along.dp.copy(), np.zeros(many, dtype=np.bool_)
     for first, width in ((DELAY, 1), (GAIN, 2), (OFFSET, 3), (PAIR, 3)):  # of the sensors, which move no machine
         bare[first : first + width] = 0.0
@@ -537,8 +544,8 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
     )  # fmt: skip
     path, own, shaft = np.zeros((size, STATES), dtype=np.complex128), np.empty((n, 3)), np.empty((size, 2)) + 0j
     run, load, within = np.empty((size, 3)) + 0j, np.zeros(3 * size - 2), np.empty((size, 4, 6))
-    shown = np.zeros((size, 2, out.shape[0]))
-    moved, ahead = np.zeros((STATES, out.shape[0])), np.zeros((STATES, out.shape[0]))
+    shown = np.zeros((size, 2, all_))
+    moved, ahead = np.zeros((STATES, all_)), np.zeros((STATES, all_))
     moved[:, :many] = along.dx.T
     path[0] = x0
     begin, begun = 0, many
@@ -595,20 +602,22 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
                 for m in range(4):
                     place = places[2 * (begin + q) + (m + 1) // 2]
                     low = min(int(place), knots.shape[0] - 2)
-                    for k in range(low, min(low + 2, out.shape[0] - many)):
+                    for k in range(low, min(low + 2, all_ - many)):
                         part = place - low if k > low else 1.0 - (place - low)
                         for i in range(STATES):
                             ahead[i, many + k] += moves.by_load[q, i, m] * part
                         begun = max(begun, many + k + 1)
             moved, ahead = ahead, moved
-        for c in range(out.shape[0]):
-            for q in range(count):
-                out[c, begin + q, 0], out[c, begin + q, 1] = shown[q, 0, c], shown[q, 1, c]
+        for c in range(all_):
+            row = along.rows[c]
+            if row != NO_ROW:
+                for q in range(count):
+                    out[row, begin + q, 0], out[row, begin + q, 1] = shown[q, 0, c], shown[q, 1, c]
         if begin + count == n:
             break
         begin += count - 1
         path[0] = path[count - 1].real
-    _shown(p, scales[0], period, along.dp, is_seen, own, out)
+    _shown(p, scales[0], period, along, is_seen, own, out)
 
 
 @_kernel
@@ -675,15 +684,18 @@ def _move(moves, q, is_moving, moved, ahead, begun):
 
 
 @_kernel
-def _shown(p, current, period, numbers, is_seen, own, out):
+def _shown(p, current, period, along, is_seen, own, out):
     """What the sensors make of the machine's moved currents `out`, beside which `own` (n, 3) are not moved; numbers of theirs move both."""
     plain = p.copy()
     for j in range(3):
         plain[OFFSET + j] = 0.0
-    for c in range(out.shape[0]):
-        if c < numbers.shape[0] and is_seen[c]:
-            both = own + 1j * STEP * out[c]
-            _chain(p + 1j * STEP * numbers[c], current, period, both)
-            out[c] = both.imag / STEP
+    for c in range(along.rows.size):
+        row = along.rows[c]
+        if row == NO_ROW:
+            continue
+        if c < is_seen.size and is_seen[c]:
+            both = own[:, : out.shape[2]] + 1j * STEP * out[row]
+            _chain(p + 1j * STEP * along.dp[c], current, period, both)
+            out[row] = both.imag / STEP
         else:
-            _chain(plain, current, period, out[c])
+            _chain(plain, current, period, out[row])

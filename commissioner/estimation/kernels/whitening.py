@@ -10,8 +10,6 @@ LARGEST = 1e8
 """Of a whitened residual or sensitivity: a run that flies away counts as enormous, and can still be squared."""
 FINITE = 1e100
 """Before whitening, which sums."""
-NO_ROW = -1
-"""In place of a row that does not move anything: zero."""
 AT_ONCE, TAPS = 1024, 4
 """Numbers, and taps, that are taken together: they stay in the nearest cache."""
 
@@ -23,25 +21,25 @@ def _within(x, most):
 
 
 @njit(error_model="numpy", fastmath={"reassoc", "contract"}, nogil=True)
-def whiten(x, rows, taps, per_zero, out):
-    """`rows` of x (C, n, 3) into `out` (rows, n, 2 or 3): alpha and beta through the moving average `taps`, the zero sequence by its own scale."""
-    n, channels = out.shape[1], out.shape[2]
+def whiten(x, taps, per_zero):
+    """x (C, n, 2 or 3) in place: alpha and beta through the moving average `taps`, the zero sequence by its own scale."""
+    n, channels = x.shape[1], x.shape[2]
     groups = (taps.size + TAPS - 1) // TAPS
     before = 2 * (groups * TAPS - 1)
     padded = np.zeros(groups * TAPS)
     padded[: taps.size] = taps
     line, summed = np.zeros(before + 2 * n), np.empty(AT_ONCE)
-    for c in range(rows.size):
-        if rows[c] == NO_ROW:
-            out[c] = 0.0
-            continue
-        row = x[rows[c]]
-        for q in range(n):
+    for c in range(x.shape[0]):
+        row, begin = x[c], 0
+        while begin < n and row[begin, 0] == 0.0 and row[begin, 1] == 0.0 and row[begin, channels - 1] == 0.0:
+            begin += 1  # a knot of the load that has not begun moves nothing
+        for q in range(begin, n):
             for e in range(2):
                 line[before + 2 * q + e] = _within(row[q, e], FINITE)
             if channels == 3:
-                out[c, q, 2] = _within(_within(row[q, 2], FINITE) * per_zero, LARGEST)
-        for first in range(0, 2 * n, AT_ONCE):
+                row[q, 2] = _within(_within(row[q, 2], FINITE) * per_zero, LARGEST)
+        line[: before + 2 * begin] = 0.0
+        for first in range(2 * begin, 2 * n, AT_ONCE):
             size = min(AT_ONCE, 2 * n - first)
             summed[:] = 0.0
             for g in range(groups):
@@ -51,5 +49,5 @@ def whiten(x, rows, taps, per_zero, out):
                 for k in range(size):
                     summed[k] += a * now[k] + b * last[k] + d * older[k] + e * oldest[k]
             for k in range(size // 2):
-                out[c, first // 2 + k, 0] = _within(summed[2 * k], LARGEST)
-                out[c, first // 2 + k, 1] = _within(summed[2 * k + 1], LARGEST)
+                row[first // 2 + k, 0] = _within(summed[2 * k], LARGEST)
+                row[first // 2 + k, 1] = _within(summed[2 * k + 1], LARGEST)

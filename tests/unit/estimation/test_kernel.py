@@ -58,7 +58,7 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free, ex
     voltage, w = forcing(count)
     load = Load(np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1))
     exact, none_x = np.empty((COUNT, count, 3)), np.zeros((COUNT, STATES))
-    along = Directions(np.eye(COUNT), none_x)
+    along = Directions(np.eye(COUNT), none_x, np.arange(COUNT))
     tangents(p, SCALES.as_tuple(), start, along, voltage, w, load, PERIOD, is_free, exact)
     for k, name in enumerate(NAMES):
         step = 1e-5 * max(abs(p[k]), 0.05 if name not in DEFAULTS else p[k])
@@ -76,7 +76,7 @@ def test_derivatives_by_the_first_state_are_those_of_differences(is_free):
     count, p, exact = 300, numbers(SPOKEN), np.empty((STATES, 300, 3))
     start = np.array([0.3, -0.9, 0.2, -0.8, 2.0, 1.0, 0.1, 0.2, 290.0, 0.4, 20.0])
     load = Load(np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1))
-    along = Directions(np.zeros((STATES, COUNT)), np.eye(STATES))
+    along = Directions(np.zeros((STATES, COUNT)), np.eye(STATES), np.arange(STATES))
     tangents(p, SCALES.as_tuple(), start, along, *forcing(count), load, PERIOD, is_free, exact)
     for found, direction in zip(exact, np.eye(STATES), strict=True):
         step = 1e-5 * max(start @ direction, 1.0) * direction
@@ -115,7 +115,7 @@ def exact(tmp_path_factory):
 def test_derivatives_along_the_loads_knots_are_those_of_complex_marches(exact, many):
     """Everything else in the machine spoken for; asked for all of them or for the first three."""
     found = np.empty((many, COUNT_LOADED, 3))
-    none = Directions(np.zeros((0, COUNT)), np.zeros((0, STATES)))
+    none = Directions(np.zeros((0, COUNT)), np.zeros((0, STATES)), np.arange(many))
     tangents(
         numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), none, *forcing(COUNT_LOADED), LOAD, PERIOD, True, found
     )
