@@ -398,14 +398,30 @@ class _Sensitivity:
     Jacobian of an unknown load costs some hundred (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
 
     def __init__(self, jacobian: Array) -> None:
-        self.jacobian, self._is_own = jacobian, False
+        self._first = jacobian
+        self._learnt: list[tuple[Array, Array]] = []
         self._gram = jacobian @ jacobian.T
+
+    def jacobian(self) -> Array:
+        """With what was learnt."""
+        learnt = self._first.copy() if self._learnt else self._first
+        for weight, missed in self._learnt:
+            for j, share in enumerate(weight):  # an outer product would be as large as the Jacobian
+                learnt[j] += share * missed
+        return learnt
+
+    def _along(self, change: Array) -> Array:
+        """The Jacobian times a row of samples."""
+        out = self._first @ change
+        for weight, missed in self._learnt:
+            out += float(missed @ change) * weight
+        return np.asarray(out)
 
     def step(self, rest: Array, columns: Sequence[Column], damping: float) -> Array:
         """Levenberg-Marquardt."""
         size = np.sqrt(np.maximum(np.diag(self._gram), 1e-30))
         scaled = self._gram / np.outer(size, size) + (damping + 1e-11) * np.eye(size.size)
-        wanted = (self.jacobian @ rest) / size
+        wanted = self._along(rest) / size
         try:
             step = np.linalg.solve(scaled, wanted) / size
         except np.linalg.LinAlgError:
@@ -418,17 +434,16 @@ class _Sensitivity:
 
     def learn(self, step: Array, change: Array) -> None:
         """`change`: of the simulated current, which the Jacobian had told as `step` times itself."""
-        missed = change - step @ self.jacobian
+        missed = change - step @ self._first
+        for earlier, own in self._learnt:
+            missed -= float(step @ earlier) * own
         weight = step * np.maximum(np.diag(self._gram), 1e-30)
         weight /= max(float(step @ weight), 1e-300)
-        along = self.jacobian @ missed
+        along = self._along(missed)
         self._gram += (
             np.outer(weight, along) + np.outer(along, weight) + float(missed @ missed) * np.outer(weight, weight)
         )
-        if not self._is_own:
-            self.jacobian, self._is_own = self.jacobian.copy(), True
-        for j, share in enumerate(weight):  # an outer product would be as large as the Jacobian
-            self.jacobian[j] += share * missed
+        self._learnt.append((weight, missed))
 
 
 def refine(
@@ -472,7 +487,7 @@ def refine(
     if known is None or (is_final and not is_fresh):
         slopes = Slopes(lambda: jacobian(problem, machine, columns))
     else:
-        slopes = Slopes.known(known.jacobian)
+        slopes = Slopes(known.jacobian)
     held = held_part(problem, parts)
     return Fit(machine, tuple(columns), chi2, rest, slopes, float(held @ held), int(held.size))
 

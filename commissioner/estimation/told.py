@@ -48,7 +48,9 @@ class Slopes:
     @cached_property
     def jacobian(self) -> Array:
         """(columns, samples)."""
-        return self._make()
+        made = self._make()
+        self._make = lambda: made  # what it was made from may go
+        return made
 
     @cached_property
     def gram(self) -> Array:

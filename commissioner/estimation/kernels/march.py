@@ -485,17 +485,8 @@ def _moves(p, scales, states, numbers, voltage, speed, load, period, is_free, mo
             first = (0, 3, 1, 2)[c - STATES - many]
             level[first :: (6 if first % 3 == 0 else 3)] += 1j * STEP
         _steps(
-            moved,
-            scales,
-            States(before, after, states.within, True),
-            voltage,
-            speed,
-            Load(level, places),
-            period,
-            is_free,
-            run,
-            shaft,
-        )
+            moved, scales, States(before, after, states.within, True), voltage, speed, Load(level, places), period, is_free, run, shaft,
+        )  # fmt: skip
         for q in range(count):
             if c < STATES:
                 moves.to_current[q, 0, c], moves.to_current[q, 1, c] = run[q, 0].imag / STEP, run[q, 1].imag / STEP
@@ -568,18 +559,8 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
             _as_lines(bare, scales, within[: count - 1])
         path[0] = first  # as it was given, where nothing was known of it
         own[rows] = run[:count].real
-        is_moving = _moves(
-            bare,
-            scales,
-            States(path[:count], path, within, False),
-            numbers,
-            volts,
-            speeds,
-            level,
-            period,
-            is_free,
-            moves,
-        )
+        own_path = States(path[:count], path, within, False)
+        is_moving = _moves(bare, scales, own_path, numbers, volts, speeds, level, period, is_free, moves)
         if is_free:
             _by_shaft(torques, within, scales, count, moves)
             if _turns_load_alone(bare, is_free):
