@@ -389,7 +389,7 @@ def _steps(p, scales, states, voltage, speed, load_torque, period, is_free, out,
                 after[at, j] = before[at, j] + h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
 
 
-@_inlined
+@_kernel
 def _chain(p, current, period, out):
     """What the current's sensors make of it: age, gains against their mean, offsets; alpha, beta, zero.
 
@@ -446,7 +446,8 @@ def _turns_load_alone(p, is_free):
 def _moving(p, period, is_free, w_n):
     """(STATES,): which states move at all and anything with them."""
     moves = np.ones(STATES, dtype=np.bool_)
-    moves[4:6], moves[6:8] = p[BAR] != 0.0, (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
+    moves[4] = moves[5] = p[BAR] != 0.0
+    moves[6] = moves[7] = (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
     moves[8], moves[9] = is_free, (p[CAGE] != 0.0) or (p[CAGE + 1] != 0.0)
     for j in range(4):
         moves[9] = moves[9] or (is_free and p[RIPPLE + j] != 0.0) or (not is_free and j < 2 and p[W_RIPPLE + j] != 0.0)
@@ -458,34 +459,43 @@ def _moving(p, period, is_free, w_n):
 
 @_kernel
 def _moves(p, scales, states, numbers, voltage, speed, load, period, is_free, moves):
-    """`moves` of the block that goes through `states` (before: B, STATES), along every state that moves and the `numbers` (P, COUNT). `load` (3B - 2,): at
-    the stages of its steps."""
+    """`moves` of the block that goes through `states` (before: B, STATES), along every state that moves and the `numbers` (P, COUNT). `load`: at the
+    stages of its steps."""
     count, path = states.before.shape[0], states.before
     is_moving = _moving(p, period, is_free, scales[2])
     before, after = np.empty((count, STATES), dtype=np.complex128), np.empty((count, STATES), dtype=np.complex128)
     run, shaft = np.empty((count, 3), dtype=np.complex128), np.empty((count, 2), dtype=np.complex128)
-    places, is_by_load = np.arange(3 * count - 2) * 1.0, _turns_load_alone(p, is_free)
-    many = numbers.shape[0]
-    moves.by_number[:] = 0.0
+    many, is_by_load = numbers.shape[0], _turns_load_alone(p, is_free)
+    moved, level = np.empty(p.size, dtype=np.complex128), np.empty(3 * count - 2, dtype=np.complex128)
     for c in range(STATES + many + (4 if is_free else 0)):
         if c < STATES and (not is_moving[c] or (c == 9 and is_by_load)):
             continue
-        moved, level = p + 0j, load + 0j
+        number, is_free_number = c - STATES, False
+        for i in range(p.size):
+            moved[i] = p[i]
+            if 0 <= number < many and numbers[number, i] != 0.0:
+                moved[i] += 1j * STEP * numbers[number, i]
+                is_free_number = True
+        for m in range(level.size):
+            level[m] = load.knots[m].real
         for q in range(count):
+            if 0 <= number < many:
+                for i in range(STATES):
+                    moves.by_number[q, i, number] = 0.0
             for i in range(STATES):
                 before[q, i] = path[q, i].real
         if c < STATES:
             for q in range(count):
                 before[q, c] += 1j * STEP
         elif c < STATES + many:
-            if not numbers[c - STATES].any():
+            if not is_free_number:
                 continue
-            moved += 1j * STEP * numbers[c - STATES]
         else:  # one step begins where another ends: every other of these, the others, twice what lies between
             first = (0, 3, 1, 2)[c - STATES - many]
-            level[first :: (6 if first % 3 == 0 else 3)] += 1j * STEP
+            for m in range(first, level.size, 6 if first % 3 == 0 else 3):
+                level[m] += 1j * STEP
         _steps(
-            moved, scales, States(before, after, states.within, True), voltage, speed, Load(level, places), period, is_free, run, shaft,
+            moved, scales, States(before, after, states.within, True), voltage, speed, Load(level, load.places), period, is_free, run, shaft,
         )  # fmt: skip
         for q in range(count):
             if c < STATES:
@@ -517,48 +527,68 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
     """
     knots, places = load_torque.knots, load_torque.places
     n, many, all_ = out.shape[1], along.dp.shape[0], along.rows.size
-    bare, numbers, is_seen = p.copy(), along.dp.copy(), np.zeros(many, dtype=np.bool_)
-    for first, width in ((DELAY, 1), (GAIN, 2), (OFFSET, 3), (PAIR, 3)):  # of the sensors, which move no machine
-        bare[first : first + width] = 0.0
+    bare, numbers, torques = np.empty(p.size), np.zeros((many, p.size)), np.zeros((many, 1 + LOADS))
+    whole, is_seen = np.empty(p.size, dtype=np.complex128), np.zeros(many, dtype=np.bool_)
+    for k in range(p.size):
+        is_of_sensors = DELAY <= k < PAIR + 3  # which move no machine
+        bare[k] = 0.0 if is_of_sensors else p[k]
+        whole[k] = bare[k]
         for c in range(many):
-            is_seen[c] = is_seen[c] or numbers[c, first : first + width].any()
-            numbers[c, first : first + width] = 0.0
-    torques = numbers[:, INERTIA : INERTIA + 1 + LOADS].copy()  # these move the shaft alone
-    numbers[:, INERTIA : INERTIA + 1 + LOADS] = 0.0
-    whole = bare + 0j  # a state that only a number moves which is zero is on the path too
-    for c in range(many):
-        whole += 1j * STEP * np.abs(numbers[c])
+            if is_of_sensors:
+                is_seen[c] = is_seen[c] or along.dp[c, k] != 0.0
+            elif INERTIA <= k <= INERTIA + LOADS:  # which move the shaft alone
+                torques[c, k - INERTIA] = along.dp[c, k]
+            else:
+                numbers[c, k] = along.dp[c, k]
+                whole[k] += (
+                    1j * STEP * abs(numbers[c, k])
+                )  # a state that only a number moves which is zero is on the path too
     size = min(n, BLOCK)
     moves = Moves(
         np.zeros((size, STATES, STATES)), np.zeros((size, STATES, many)), np.zeros((size, STATES, 4)),
         np.zeros((size, 2, STATES)), np.zeros((size, 2, many)),
     )  # fmt: skip
-    path, own, shaft = np.zeros((size, STATES), dtype=np.complex128), np.empty((n, 3)), np.empty((size, 2)) + 0j
-    run, load, within = np.empty((size, 3)) + 0j, np.zeros(3 * size - 2), np.empty((size, 4, 6))
+    path, own, shaft = (
+        np.zeros((size, STATES), dtype=np.complex128),
+        np.empty((n, 3)),
+        np.empty((size, 2), dtype=np.complex128),
+    )
+    run, load, within = (
+        np.empty((size, 3), dtype=np.complex128),
+        np.zeros(3 * size - 2, dtype=np.complex128),
+        np.empty((size, 4, 6)),
+    )
     shown = np.zeros((size, 2, all_))
     moved, ahead = np.zeros((STATES, all_)), np.zeros((STATES, all_))
-    moved[:, :many] = along.dx.T
-    path[0] = x0
+    stages = np.empty(3 * size - 2)
+    for m in range(stages.size):
+        stages[m] = m
+    for j in range(STATES):
+        path[0, j] = x0[j]
+        for c in range(many):
+            moved[j, c] = along.dx[c, j]
     begin, begun = 0, many
     while True:
         count = min(size, n - begin)
-        rows, between = slice(begin, begin + count), slice(2 * begin, 2 * (begin + count) - 1)
-        volts, speeds, level = voltage[between], speed[between], load[: 3 * count - 2]
+        end, ends = 2 * (begin + count) - 1, 3 * count - 2
+        volts, speeds, level = voltage[2 * begin : end], speed[2 * begin : end], Load(load[:ends], stages[:ends])
         if is_free:
-            for m in range(3 * count - 2):
+            for m in range(ends):
                 place = places[2 * (begin + m // 3) + min(m % 3, 1)]
                 low = min(int(place), knots.shape[0] - 2)
                 part = place - low
-                level[m] = knots[low] * (1.0 - part) + knots[low + 1] * part
-        first = path[0].copy()
+                load[m] = knots[low] * (1.0 - part) + knots[low + 1] * part
+        unset = path[0, 10]
         _steps(
-            whole, scales, States(path[:count], path[1:count], within, False), volts, speeds,
-            Load(level + 0j, np.arange(3 * count - 2) * 1.0), period, is_free, run[:count], shaft[:count],
+            whole, scales, States(path[:count], path[1:count], within, False), volts, speeds, level, period, is_free, run[:count],
+            shaft[:count],
         )  # fmt: skip
         if is_free:
             _as_lines(bare, scales, within[: count - 1])
-        path[0] = first  # as it was given, where nothing was known of it
-        own[rows] = run[:count].real
+        path[0, 10] = unset  # as it was given, where nothing was known of it
+        for q in range(count):
+            for e in range(2):
+                own[begin + q, e] = run[q, e].real
         own_path = States(path[:count], path, within, False)
         is_moving = _moves(bare, scales, own_path, numbers, volts, speeds, level, period, is_free, moves)
         if is_free:
@@ -568,7 +598,8 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         for q in range(count):
             for e in range(2):
                 row = shown[q, e]
-                row[:] = 0.0
+                for c in range(all_):
+                    row[c] = 0.0
                 for j in range(STATES):
                     share = moves.to_current[q, e, j]
                     if is_moving[j] and share != 0.0:
@@ -597,7 +628,8 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         if begin + count == n:
             break
         begin += count - 1
-        path[0] = path[count - 1].real
+        for j in range(STATES):
+            path[0, j] = path[count - 1, j].real
     _shown(p, scales[0], period, along, is_seen, own, out)
 
 
@@ -605,7 +637,7 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
 def _as_lines(p, scales, within):
     """The laws of the load along a path, and by what they change with speed and angle."""
     per_w, per_pairs = 1.0 / scales[2], 1.0 / scales[4]
-    has_ripple = p[RIPPLE : RIPPLE + 4].any()
+    has_ripple = p[RIPPLE] != 0.0 or p[RIPPLE + 1] != 0.0 or p[RIPPLE + 2] != 0.0 or p[RIPPLE + 3] != 0.0
     for q in range(within.shape[0]):
         for stage in range(4):
             at = within[q, stage]
@@ -622,7 +654,10 @@ def _by_shaft(torques, within, scales, count, moves):
     free, laws = np.empty(torques.shape[0], dtype=np.int64), np.empty(1 + LOADS)
     many = 0
     for c in range(torques.shape[0]):
-        if torques[c].any():
+        is_told = False
+        for j in range(1 + LOADS):
+            is_told = is_told or torques[c, j] != 0.0
+        if is_told:
             free[many] = c
             many += 1
     for q in range(count - 1 if many else 0):
@@ -630,8 +665,8 @@ def _by_shaft(torques, within, scales, count, moves):
             laws[0] = within[q, stage, 2] / (pairs * torque_n)
             laws[1], laws[2], laws[3], laws[4] = _friction_laws(within[q, stage, 0] / w_n)
             laws[5], laws[6], laws[7], laws[8] = _ripple_laws(laws[1], within[q, stage, 1] / pairs)
-            for c in free[:many]:
-                load = 0.0
+            for place in range(many):
+                c, load = free[place], 0.0
                 for j in range(1 + LOADS):
                     load += torques[c, j] * laws[j]
                 for i in range(STATES):
@@ -667,16 +702,23 @@ def _move(moves, q, is_moving, moved, ahead, begun):
 @_kernel
 def _shown(p, current, period, along, is_seen, own, out):
     """What the sensors make of the machine's moved currents `out`, beside which `own` (n, 3) are not moved; numbers of theirs move both."""
-    plain = p.copy()
-    for j in range(3):
-        plain[OFFSET + j] = 0.0
+    plain, moved = np.empty(p.size), np.empty(p.size, dtype=np.complex128)
+    both = np.empty((out.shape[1], out.shape[2]), dtype=np.complex128)
+    for k in range(p.size):
+        plain[k] = 0.0 if OFFSET <= k < OFFSET + 3 else p[k]
     for c in range(along.rows.size):
         row = along.rows[c]
         if row == NO_ROW:
             continue
         if c < is_seen.size and is_seen[c]:
-            both = own[:, : out.shape[2]] + 1j * STEP * out[row]
-            _chain(p + 1j * STEP * along.dp[c], current, period, both)
-            out[row] = both.imag / STEP
+            for k in range(p.size):
+                moved[k] = p[k] + 1j * STEP * along.dp[c, k]
+            for q in range(out.shape[1]):
+                for e in range(2):
+                    both[q, e] = own[q, e] + 1j * STEP * out[row, q, e]
+            _chain(moved, current, period, both)
+            for q in range(out.shape[1]):
+                for e in range(out.shape[2]):
+                    out[row, q, e] = both[q, e].imag / STEP
         else:
             _chain(plain, current, period, out[row])

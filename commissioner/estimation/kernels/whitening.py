@@ -27,7 +27,8 @@ def whiten(x, taps, per_zero):
     groups = (taps.size + TAPS - 1) // TAPS
     before = 2 * (groups * TAPS - 1)
     padded = np.zeros(groups * TAPS)
-    padded[: taps.size] = taps
+    for g in range(taps.size):
+        padded[g] = taps[g]
     line, summed = np.zeros(before + 2 * n), np.empty(AT_ONCE)
     for c in range(x.shape[0]):
         row, begin = x[c], 0
@@ -38,16 +39,17 @@ def whiten(x, taps, per_zero):
                 line[before + 2 * q + e] = _within(row[q, e], FINITE)
             if channels == 3:
                 row[q, 2] = _within(_within(row[q, 2], FINITE) * per_zero, LARGEST)
-        line[: before + 2 * begin] = 0.0
+        for k in range(before + 2 * begin):
+            line[k] = 0.0
         for first in range(2 * begin, 2 * n, AT_ONCE):
             size = min(AT_ONCE, 2 * n - first)
-            summed[:] = 0.0
+            for k in range(size):
+                summed[k] = 0.0
             for g in range(groups):
                 a, b, d, e = padded[4 * g], padded[4 * g + 1], padded[4 * g + 2], padded[4 * g + 3]
                 at = first + before - 2 * TAPS * g
-                now, last, older, oldest = line[at:], line[at - 2 :], line[at - 4 :], line[at - 6 :]
                 for k in range(size):
-                    summed[k] += a * now[k] + b * last[k] + d * older[k] + e * oldest[k]
+                    summed[k] += a * line[at + k] + b * line[at + k - 2] + d * line[at + k - 4] + e * line[at + k - 6]
             for k in range(size // 2):
                 row[first // 2 + k, 0] = _within(summed[2 * k], LARGEST)
                 row[first // 2 + k, 1] = _within(summed[2 * k + 1], LARGEST)
