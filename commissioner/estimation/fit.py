@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
 from commissioner.estimation.kernels.march import NO_ROW, STATES, UNSET, Directions, Load, march, tangents
+from commissioner.estimation.kernels.whitening import whiten
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
@@ -191,6 +192,10 @@ class Problem:
     def period(self) -> float:
         return self.record.period_s
 
+    def whiten(self, x: Array) -> None:
+        """(C, n, channels of the noise) in place: unit variance where only chance is left."""
+        whiten(x, self.noise.taps, self.noise.per_zero)
+
     def cut(self, seconds: float) -> Problem:
         """Only so much of each window, for a fit that begins with little."""
         shorter = tuple(min(u, max(round(seconds / self.period), 60)) for u in self.until)
@@ -235,7 +240,7 @@ def residuals(problem: Problem, machine: Machine) -> list[Array]:
         with np.errstate(all="ignore"):
             left = w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6)
         rest = left[:, : problem.noise.channels].copy()
-        problem.noise.whiten(rest[None])
+        problem.whiten(rest[None])
         rest[:EDGE] = 0.0
         rest[-EDGE:] = 0.0
         out.append(rest)
@@ -268,7 +273,7 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
         white = np.empty((len(columns), u, problem.noise.channels))
         white[sorted({*range(len(columns))} - {*own, *by_load})] = 0.0
         _sensitivities(problem, machine, k, columns, rows, white)
-        problem.noise.whiten(white)
+        problem.whiten(white)
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0

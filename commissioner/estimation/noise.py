@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
-from commissioner.estimation.kernels.whitening import whiten
-
 Array = NDArray[np.float64]
 ORDER = 30
 """Of the autoregression; with it nulls have a chi-square of 0.99 to 1.01 a sample."""
@@ -31,9 +29,15 @@ class Noise:
         """Of a current that is whitened: alpha, beta, and the zero sequence where there is one."""
         return 3 if self.has_zero else 2
 
-    def whiten(self, x: Array) -> None:
-        """(C, n, channels) in place: unit variance where only chance is left."""
-        whiten(x, self.coefficients / self.sigma, 1.0 / self.zero if self.has_zero else 0.0)
+    @property
+    def taps(self) -> Array:
+        """Of the moving average that whitens alpha and beta, 1/A."""
+        return self.coefficients / self.sigma
+
+    @property
+    def per_zero(self) -> float:
+        """By which the zero sequence is whitened, 1/A."""
+        return 1.0 / self.zero if self.has_zero else 0.0
 
 
 def plain_noise(sigma_a: tuple[float, float, float], has_zero: bool) -> Noise:
