@@ -400,7 +400,7 @@ def _knots_of(record: Record, machine: Machine) -> Iterator[Column]:
 
 class _Sensitivity:
     """A Jacobian (columns, samples), its products, and what steps with it have taught: Broyden's update, a simulation's worth, where the
-    Jacobian of an unknown load costs some hundred (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
+    Jacobian of an unknown load costs some forty (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
 
     def __init__(self, jacobian: Array) -> None:
         self._first = jacobian
@@ -457,7 +457,7 @@ def refine(
 ) -> Fit:  # fmt: skip
     """Levenberg-Marquardt from `machine`; `first_jacobian` as known from near by.
 
-    A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a hundredth of it). `is_final`: end
+    A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a fortieth of it). `is_final`: end
     with a fresh one.
     """
     parts = residuals(problem, machine)
