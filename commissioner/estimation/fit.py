@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
-from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import NO_ROW, STATES, UNSET, Directions, Load, march, tangents
+from commissioner.estimation.kernels.whitening import whiten
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
 from commissioner.estimation.record import Record, Window, first_part
-from commissioner.estimation.told import Told, inverse, told
+from commissioner.estimation.told import Slopes, Told, told
 
 Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
 FIRST = (0, 1, 2, 3)
 """Numbers of a window's first state that are free: both fluxes. (8 is the speed, where the shaft is modelled and already turns.)"""
-LARGEST = 1e8
-"""Of a whitened residual or sensitivity: a run that flies away counts as enormous, and can still be squared."""
-FINITE = 1e100
-"""Before whitening, which sums."""
 LARGEST_STEP = 0.7
 """Of a logarithm in one step: a factor of 2."""
 ENDED = 0.05
@@ -194,6 +192,10 @@ class Problem:
     def period(self) -> float:
         return self.record.period_s
 
+    def whiten(self, x: Array) -> None:
+        """(C, n, channels of the noise) in place: unit variance where only chance is left."""
+        whiten(x, self.noise.taps, self.noise.per_zero)
+
     def cut(self, seconds: float) -> Problem:
         """Only so much of each window, for a fit that begins with little."""
         shorter = tuple(min(u, max(round(seconds / self.period), 60)) for u in self.until)
@@ -236,10 +238,12 @@ def residuals(problem: Problem, machine: Machine) -> list[Array]:
     out = []
     for w, (run, _) in zip(problem.record.windows, simulate(problem, machine), strict=True):
         with np.errstate(all="ignore"):
-            rest = problem.noise.white(w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6))
+            left = w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6)
+        rest = left[:, : problem.noise.channels].copy()
+        problem.whiten(rest[None])
         rest[:EDGE] = 0.0
         rest[-EDGE:] = 0.0
-        out.append(np.clip(rest, -LARGEST, LARGEST))
+        out.append(rest)
     return out
 
 
@@ -260,16 +264,16 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
         ask_for_time()
-        run = np.zeros((len(columns), u, 3))
         own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind in "wx" and c.window == k)]
         by_load = [j for j, c in enumerate(columns) if c.kind == "k" and c.window == k]
-        run[own] = _along_numbers(problem, machine, k, [columns[j] for j in own])
-        if by_load:
-            indices = [columns[j].index for j in by_load]
-            run[by_load] = _along_loads(problem, machine, k, max(indices) + 1)[indices]
-        flown = np.clip(np.nan_to_num(run, copy=False), -FINITE, FINITE, out=run)
-        white = problem.noise.white(flown)
-        np.clip(white, -LARGEST, LARGEST, out=white)
+        knots = [columns[j].index for j in by_load]
+        rows = np.full(len(own) + max(knots, default=-1) + 1, NO_ROW)
+        rows[: len(own)] = own
+        rows[len(own) + np.array(knots, dtype=np.int64)] = by_load
+        white = np.empty((len(columns), u, problem.noise.channels))
+        white[sorted({*range(len(columns))} - {*own, *by_load})] = 0.0
+        _sensitivities(problem, machine, k, columns, rows, white)
+        problem.whiten(white)
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0
@@ -277,37 +281,28 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
-def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence[Column]) -> Array:
-    """(columns, n, 3) of window k: its currents by numbers of the machine and of its own first state."""
+def _sensitivities(
+    problem: Problem, machine: Machine, k: int, columns: Sequence[Column], rows: NDArray[np.int64], out: Array
+) -> None:
+    """Currents of window k by the numbers of the machine and of its own first state, and by the first knots of its load, into their `rows` of
+    `out` (columns, n, channels)."""
     slope, w, u = machine.slope(), problem.record.windows[k], problem.until[k]
-    dp, dx = np.zeros((len(columns), COUNT)), np.zeros((len(columns), STATES))
-    for row, column in enumerate(columns):
+    numbers = sum(c.kind == "p" or (c.kind in "wx" and c.window == k) for c in columns)
+    dp, dx = np.zeros((numbers, COUNT)), np.zeros((numbers, STATES))
+    for row, column in enumerate(columns[j] for j in rows[:numbers]):
         if column.kind in "pw":
             dp[row, column.index] = slope[column.index]
         else:
             dx[row, column.index] = 1.0
-    run = np.empty((len(columns), u, 3))
     tangents(
-        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], Directions(dp, dx), w.voltage[: 2 * u - 1],
-        w.speed[: 2 * u - 1], machine.load(k, u, problem.period), problem.period, machine.has_shaft, run,
+        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], Directions(dp, dx, rows), w.voltage[: 2 * u - 1],
+        w.speed[: 2 * u - 1], machine.load(k, u, problem.period), problem.period, machine.has_shaft, out,
     )  # fmt: skip
-    return run
-
-
-def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Array:
-    """(count, n, 3) of window k: its currents by the first knots of its load."""
-    w, u = problem.record.windows[k], problem.until[k]
-    run = np.empty((count, u, 3))
-    load_tangents(
-        machine.physical(k), problem.record.scales.as_tuple(), machine.first[k], w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
-        machine.load(k, u, problem.period), problem.period, run,
-    )  # fmt: skip
-    return run
 
 
 @dataclass(frozen=True)
 class Fit:
-    """`rest`: whitened residual of the fitted part, `jacobian` where it ended (columns, samples); `held`: chi-square of the held-out part.
+    """`rest`: whitened residual of the fitted part, `slopes` where it ended; `held`: chi-square of the held-out part.
     `by_noise`: what the input's noise makes of the Jacobian's Gram matrix, `aside` (k, columns): by how much it may draw them aside besides; both from
     `unbiased`, nothing before."""
 
@@ -315,11 +310,16 @@ class Fit:
     columns: tuple[Column, ...]
     chi2: float
     rest: Array
-    jacobian: Array
+    slopes: Slopes
     held: float
     held_count: int
     by_noise: Array | float = 0.0
     aside: Array | float = 0.0
+
+    @property
+    def jacobian(self) -> Array:
+        """Whitened sensitivities (columns, samples)."""
+        return self.slopes.jacobian
 
     @property
     def count(self) -> int:
@@ -333,7 +333,7 @@ class Fit:
 
     def influence(self) -> Array:
         """By how much of its number each column's gradient moves the fit: the inverse of the Gram matrix."""
-        return inverse(self.jacobian @ self.jacobian.T)
+        return self.slopes.influence
 
     def covariance(self) -> Array:
         """Of the columns' numbers in fit coordinates, widened by what is left."""
@@ -347,9 +347,12 @@ class Fit:
     def told(self) -> Told:
         """What the sensitivities tell of the columns' numbers, nothing else left. An open direction along which none of the four numbers
         is wide (the inertia that a load's ripple tells) is as far off as any other."""
-        gram = self.jacobian @ self.jacobian.T
-        whole = told(gram, self.by_noise)
-        return whole if self._opened(whole) else told(gram, 0.0)
+        return self._told
+
+    @cached_property
+    def _told(self) -> Told:
+        whole = told(self.slopes.gram, self.by_noise)
+        return whole if self._opened(whole) else told(self.slopes.gram, 0.0)
 
     def _opened(self, whole: Told) -> tuple[str, ...]:
         reach = np.sqrt(whole.open.diagonal())
@@ -397,17 +400,33 @@ def _knots_of(record: Record, machine: Machine) -> Iterator[Column]:
 
 class _Sensitivity:
     """A Jacobian (columns, samples), its products, and what steps with it have taught: Broyden's update, a simulation's worth, where the
-    Jacobian of an unknown load costs some hundred (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
+    Jacobian of an unknown load costs some forty (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
 
     def __init__(self, jacobian: Array) -> None:
-        self.jacobian, self._is_own = jacobian, False
+        self._first = jacobian
+        self._learnt: list[tuple[Array, Array]] = []
         self._gram = jacobian @ jacobian.T
+
+    def jacobian(self) -> Array:
+        """With what was learnt."""
+        learnt = self._first.copy() if self._learnt else self._first
+        for weight, missed in self._learnt:
+            for j, share in enumerate(weight):  # an outer product would be as large as the Jacobian
+                learnt[j] += share * missed
+        return learnt
+
+    def _along(self, change: Array) -> Array:
+        """The Jacobian times a row of samples."""
+        out = self._first @ change
+        for weight, missed in self._learnt:
+            out += float(missed @ change) * weight
+        return np.asarray(out)
 
     def step(self, rest: Array, columns: Sequence[Column], damping: float) -> Array:
         """Levenberg-Marquardt."""
         size = np.sqrt(np.maximum(np.diag(self._gram), 1e-30))
         scaled = self._gram / np.outer(size, size) + (damping + 1e-11) * np.eye(size.size)
-        wanted = (self.jacobian @ rest) / size
+        wanted = self._along(rest) / size
         try:
             step = np.linalg.solve(scaled, wanted) / size
         except np.linalg.LinAlgError:
@@ -420,17 +439,16 @@ class _Sensitivity:
 
     def learn(self, step: Array, change: Array) -> None:
         """`change`: of the simulated current, which the Jacobian had told as `step` times itself."""
-        missed = change - step @ self.jacobian
+        missed = change - step @ self._first
+        for earlier, own in self._learnt:
+            missed -= float(step @ earlier) * own
         weight = step * np.maximum(np.diag(self._gram), 1e-30)
         weight /= max(float(step @ weight), 1e-300)
-        along = self.jacobian @ missed
+        along = self._along(missed)
         self._gram += (
             np.outer(weight, along) + np.outer(along, weight) + float(missed @ missed) * np.outer(weight, weight)
         )
-        if not self._is_own:
-            self.jacobian, self._is_own = self.jacobian.copy(), True
-        for j, share in enumerate(weight):  # an outer product would be as large as the Jacobian
-            self.jacobian[j] += share * missed
+        self._learnt.append((weight, missed))
 
 
 def refine(
@@ -439,7 +457,7 @@ def refine(
 ) -> Fit:  # fmt: skip
     """Levenberg-Marquardt from `machine`; `first_jacobian` as known from near by.
 
-    A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a hundredth of it). `is_final`: end
+    A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a fortieth of it). `is_final`: end
     with a fresh one.
     """
     parts = residuals(problem, machine)
@@ -472,11 +490,13 @@ def refine(
         else:
             damping = max(10.0 * damping, 1e-3)
     if known is None or (is_final and not is_fresh):
-        known = _Sensitivity(jacobian(problem, machine, columns))
+        slopes = Slopes(lambda: jacobian(problem, machine, columns))
+    else:
+        slopes = Slopes(known.jacobian)
     held = held_part(problem, parts)
-    return Fit(machine, tuple(columns), chi2, rest, known.jacobian, float(held @ held), int(held.size))
+    return Fit(machine, tuple(columns), chi2, rest, slopes, float(held @ held), int(held.size))
 
 
 def refreshed(problem: Problem, fit: Fit) -> Fit:
     """The same fit with the Jacobian of where it ended."""
-    return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
+    return replace(fit, slopes=Slopes(lambda: jacobian(problem, fit.machine, fit.columns)))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 ORDER = 30
@@ -25,10 +24,20 @@ class Noise:
     total: float = 0.0
     """Standard deviation of alpha and beta, not whitened, A."""
 
-    def white(self, x: Array) -> Array:
-        """(..., n, 3) -> (..., n, 2 or 3), unit variance where only chance is left."""
-        ab = lfilter(self.coefficients, [1.0], x[..., :2], axis=-2) / self.sigma
-        return np.concatenate([ab, x[..., 2:] / self.zero], axis=-1) if self.has_zero else ab
+    @property
+    def channels(self) -> int:
+        """Of a current that is whitened: alpha, beta, and the zero sequence where there is one."""
+        return 3 if self.has_zero else 2
+
+    @property
+    def taps(self) -> Array:
+        """Of the moving average that whitens alpha and beta, 1/A."""
+        return self.coefficients / self.sigma
+
+    @property
+    def per_zero(self) -> float:
+        """By which the zero sequence is whitened, 1/A."""
+        return 1.0 / self.zero if self.has_zero else 0.0
 
 
 def plain_noise(sigma_a: tuple[float, float, float], has_zero: bool) -> Noise:

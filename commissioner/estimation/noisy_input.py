@@ -77,7 +77,7 @@ def unbiased(problem: Problem, fit: Fit, seed: int = 6) -> Fit:
     ideal = replace(problem, record=replace(problem.record, windows=own))
     drawn = _input_noise(problem, np.random.default_rng(seed))
     moving = np.flatnonzero([c.kind != "p" or c.index not in SHAPES for c in fit.columns])
-    shift, by_noise = np.zeros(len(fit.columns)), -(fit.jacobian @ fit.jacobian.T)
+    shift, by_noise = np.zeros(len(fit.columns)), -fit.slopes.gram
     is_free, told_of_inertia = INERTIA in fit.columns and not problem.record.has_start, 0.0
     for sign in (1.0, -1.0):
         noisy = _shaken(ideal, drawn, sign)

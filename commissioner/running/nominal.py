@@ -25,6 +25,7 @@ from commissioner.estimation.held import best_reading
 from commissioner.estimation.noisy_input import with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import BLOCK_S, STATES, Record
+from commissioner.estimation.told import Slopes
 from commissioner.motor.nameplate import prior
 
 Array = NDArray[np.float64]
@@ -233,11 +234,8 @@ def _with_inertia(problem: Problem, machine: Machine, free: Sequence[str], *, kn
     fit = min(held, key=lambda f: f.chi2)
     if part.until != problem.until:
         fit = refine(problem, _carried_on(fit), columns_of(free, problem.record, machine, knots=knots))
-    wide = replace(
-        fit,
-        columns=(*fit.columns, INERTIA),
-        jacobian=np.concatenate([fit.jacobian, jacobian(problem, fit.machine, (INERTIA,))]),
-    )
+    both = np.concatenate([fit.jacobian, jacobian(problem, fit.machine, (INERTIA,))])
+    wide = replace(fit, columns=(*fit.columns, INERTIA), slopes=Slopes.known(both))
     if wide.std("inertia") > OPEN_INERTIA * fit.machine.value("inertia"):
         return fit
     return refine(problem, fit.machine, wide.columns, first_jacobian=wide.jacobian)

@@ -22,6 +22,7 @@ from commissioner.estimation.fit import (
 from commissioner.estimation.noisy_input import chi2_by_own_noise, unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record
+from commissioner.estimation.told import Slopes
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
 from commissioner.running.nominal import held_at_plate, nominal
@@ -288,14 +289,13 @@ def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[fl
     if not columns:
         return []
     all_own = jacobian(seeking.problem, fit.machine, columns)
-    basis, _ = np.linalg.qr(fit.jacobian.T)
-    rest = fit.rest - basis @ (basis.T @ fit.rest)
+    rest = fit.slopes.apart(fit.rest[None])[0]
+    all_apart = fit.slopes.apart(all_own)
     out, at = [], 0
     for one in causes:
         size = len(seeking.own(one.form.numbers))
-        own = all_own[at : at + size]
+        own, apart = all_own[at : at + size], all_apart[at : at + size]
         at += size
-        apart = own - (own @ basis) @ basis.T
         gram = apart @ apart.T + np.diag(1e-9 * np.maximum(np.sum(own * own, axis=1), 1e-30))
         best = np.linalg.solve(gram, apart @ rest)
         values = dict(zip(NAMES, fit.machine.physical(), strict=True)) | dict(zip(one.form.numbers, best, strict=False))
@@ -459,14 +459,13 @@ def _rivals(
     own_columns = set(seeking.own(one.numbers))
     own = np.array([j for j, c in enumerate(fit.columns) if c in own_columns])
     kept = np.array([j for j in range(len(fit.columns)) if j not in set(own.tolist())])
-    basis, _ = np.linalg.qr(fit.jacobian[kept].T)
-    mine = fit.jacobian[own] - (fit.jacobian[own] @ basis) @ basis.T
+    others_free = Slopes.known(fit.jacobian[kept])
+    mine = others_free.apart(fit.jacobian[own])
     candidates = [c for c in seeking.candidates(names) if c.cause not in always_tied(one.cause)]
     forms = (f for f in CATALOGUE[one.cause].forms if f.needs(seeking.problem.record))
     candidates += [Named(one.cause, f) for f in forms if f != one.form]
     columns = [column for c in candidates for column in seeking.own(c.form.numbers)]
-    theirs = jacobian(seeking.problem, fit.machine, columns)
-    theirs = theirs - (theirs @ basis) @ basis.T
+    theirs = others_free.apart(jacobian(seeking.problem, fit.machine, columns))
     alike, at = [], 0
     for c in candidates:
         size = len(seeking.own(c.form.numbers))
@@ -511,12 +510,10 @@ def _judged(
 
 def _limits(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> dict[str, float]:
     """Six standard deviations of each cause that was not found, in its first number's unit, beside all that was."""
-    basis, _ = np.linalg.qr(fit.jacobian.T)
     out: dict[str, float] = {}
     causes = seeking.candidates(c.cause for c in accepted)
     columns = [Column("p", AT[c.form.numbers[0]]) for c in causes]
-    own = jacobian(seeking.problem, fit.machine, columns)
-    apart = own - (own @ basis) @ basis.T
+    apart = fit.slopes.apart(jacobian(seeking.problem, fit.machine, columns))
     for one, x in zip(causes, apart, strict=True):
         limit = 6.0 * np.sqrt(fit.scale) / max(float(np.linalg.norm(x)), 1e-30)
         out[one.cause] = min(out.get(one.cause, np.inf), limit)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, load_tangents, march, tangents
+from commissioner.estimation.kernels.march import STATES, UNSET, Directions, Load, march, tangents
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
 
 SCALES = Scales(11.7, 326.6, 314.16, 26.0, 2)
@@ -46,21 +46,42 @@ def run(p, count, *, is_free, start=None, speed=300.0):
     return out, shaft
 
 
+UNSET_LOOP = np.where(np.arange(STATES) == 10, UNSET, 0.0)
+
+
+@pytest.mark.parametrize("start", [np.zeros(STATES), UNSET_LOOP], ids=["at rest", "loop unset"])
+@pytest.mark.parametrize("extra", [SPOKEN, {}], ids=["all", "four"])
 @pytest.mark.parametrize("is_free", [False, True])
-def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
-    count, p = 400, numbers(SPOKEN)
+def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free, extra, start):
+    """With all that may be added, and with nothing: a number that is zero moves states that nothing else moves."""
+    count, p = 400, numbers(extra)
     voltage, w = forcing(count)
     load = Load(np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1))
     exact, none_x = np.empty((COUNT, count, 3)), np.zeros((COUNT, STATES))
-    along = Directions(np.eye(COUNT), none_x)
-    tangents(p, SCALES.as_tuple(), np.zeros(STATES), along, voltage, w, load, PERIOD, is_free, exact)
+    along = Directions(np.eye(COUNT), none_x, np.arange(COUNT))
+    tangents(p, SCALES.as_tuple(), start, along, voltage, w, load, PERIOD, is_free, exact)
     for k, name in enumerate(NAMES):
         step = 1e-5 * max(abs(p[k]), 0.05 if name not in DEFAULTS else p[k])
         up, down = p.copy(), p.copy()
         up[k] += step
         down[k] -= step
-        differences = (run(up, count, is_free=is_free)[0] - run(down, count, is_free=is_free)[0]) / (2 * step)
+        runs = [run(moved, count, is_free=is_free, start=start)[0] for moved in (up, down)]
+        differences = (runs[0] - runs[1]) / (2 * step)
         assert np.abs(differences - exact[k]).max() <= 2e-5 * max(np.abs(exact[k]).max(), 1.0), name
+
+
+@pytest.mark.parametrize("is_free", [False, True])
+def test_derivatives_by_the_first_state_are_those_of_differences(is_free):
+    """Of every state beside all that may be added."""
+    count, p, exact = 300, numbers(SPOKEN), np.empty((STATES, 300, 3))
+    start = np.array([0.3, -0.9, 0.2, -0.8, 2.0, 1.0, 0.1, 0.2, 290.0, 0.4, 20.0])
+    load = Load(np.array([0.1, 0.3, 0.2]), np.linspace(0, 1.9, 2 * count - 1))
+    along = Directions(np.zeros((STATES, COUNT)), np.eye(STATES), np.arange(STATES))
+    tangents(p, SCALES.as_tuple(), start, along, *forcing(count), load, PERIOD, is_free, exact)
+    for found, direction in zip(exact, np.eye(STATES), strict=True):
+        step = 1e-5 * max(start @ direction, 1.0) * direction
+        up, down = (run(p, count, is_free=is_free, start=start + sign * step)[0] for sign in (1.0, -1.0))
+        assert np.abs((up - down) / (2 * step.sum()) - found).max() <= 2e-5 * max(np.abs(found).max(), 1e-3)
 
 
 COUNT_LOADED = 40
@@ -94,7 +115,10 @@ def exact(tmp_path_factory):
 def test_derivatives_along_the_loads_knots_are_those_of_complex_marches(exact, many):
     """Everything else in the machine spoken for; asked for all of them or for the first three."""
     found = np.empty((many, COUNT_LOADED, 3))
-    load_tangents(numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), *forcing(COUNT_LOADED), LOAD, PERIOD, found)
+    none = Directions(np.zeros((0, COUNT)), np.zeros((0, STATES)), np.arange(many))
+    tangents(
+        numbers(SPOKEN), SCALES.as_tuple(), np.zeros(STATES), none, *forcing(COUNT_LOADED), LOAD, PERIOD, True, found
+    )
     for one, whole in zip(found, exact, strict=False):
         assert np.abs(whole).max() > 0.0
         assert np.abs(one - whole).max() <= 1e-11 * np.abs(whole).max()

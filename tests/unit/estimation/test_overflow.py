@@ -7,6 +7,7 @@ import pytest
 
 from commissioner.estimation.fit import AT, Fit, columns_of, fitted_part, jacobian, plain_machine, problem_of, residuals
 from commissioner.estimation.record import prepare
+from commissioner.estimation.told import Slopes
 from tests.running_effects.start import PLATE, started
 
 
@@ -19,6 +20,6 @@ def test_a_load_that_flies_away_leaves_every_variance_positive(times_rated):
     columns = columns_of(list(AT)[:4], record, away, knots=True)
     rest = fitted_part(problem, residuals(problem, away))
     slopes = jacobian(problem, away, columns)
-    found = Fit(away, columns, float(rest @ rest), rest, slopes, 0.0, 0).covariance()
+    found = Fit(away, columns, float(rest @ rest), rest, Slopes.known(slopes), 0.0, 0).covariance()
     assert np.isfinite(found).all()
     assert np.diag(found)[:4].min() > 1e-12

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from commissioner.estimation.fit import Column, Fit, Machine
+from commissioner.estimation.fit import Column, Fit, Machine, _Sensitivity
 from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import AT
 from commissioner.estimation.numbers import COUNT as NUMBERS
-from commissioner.estimation.told import inverse, told
+from commissioner.estimation.told import Slopes, inverse, told
 
 RNG = np.random.default_rng(3)
 COUNT, SIGMA = 400, 0.1
@@ -64,5 +64,44 @@ def test_a_long_recording_does_not_tell_what_only_its_noise_does(along: tuple[fl
     machine = Machine(
         np.zeros(NUMBERS), np.zeros((1, STATES)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, NUMBERS))
     )
-    fit = Fit(machine, columns, 3.0, np.ones(3), jacobian, 0.0, 0, by_noise)
+    fit = Fit(machine, columns, 3.0, np.ones(3), Slopes.known(jacobian), 0.0, 0, by_noise)
     assert set(fit.not_told()) == opened
+
+
+def test_sensitivities_are_made_once_and_when_they_are_asked_for() -> None:
+    made: list[int] = []
+
+    def make() -> np.ndarray:
+        made.append(1)
+        return np.eye(2, 5)
+
+    slopes = Slopes(make)
+    assert not made
+    assert slopes.gram.tolist() == np.eye(2).tolist()
+    assert slopes.jacobian.shape == (2, 5)
+    assert made == [1]
+
+
+def test_what_sensitivities_do_not_take_up_is_what_an_orthogonal_basis_leaves() -> None:
+    """Two of them alike to 1e-4, and of sizes from 1 to 1e6."""
+    rng = np.random.default_rng(2)
+    known, rows = rng.standard_normal((6, 400)), rng.standard_normal((3, 400))
+    known[1] = known[0] + 1e-4 * known[1]
+    known *= 10.0 ** np.arange(6)[:, None]
+    basis, _ = np.linalg.qr(known.T)
+    left = Slopes.known(known).apart(rows)
+    assert np.abs(left - (rows - rows @ basis @ basis.T)).max() < 1e-7
+
+
+def test_a_jacobian_that_learnt_tells_each_change_that_it_was_taught_last() -> None:
+    """Broyden's condition, and products that are those of the Jacobian."""
+    rng = np.random.default_rng(3)
+    learning = _Sensitivity(rng.standard_normal((3, 50)))
+    for _ in range(3):
+        step, change = rng.standard_normal(3), rng.standard_normal(50)
+        learning.learn(step, change)
+        assert np.abs(step @ learning.jacobian() - change).max() < 1e-9
+    columns = [Column("k", j) for j in range(3)]
+    plain, rest = learning.jacobian(), rng.standard_normal(50)
+    wanted = np.linalg.solve(plain @ plain.T, plain @ rest)
+    assert np.abs(learning.step(rest, columns, 0.0) - wanted).max() < 1e-6 * np.abs(wanted).max()

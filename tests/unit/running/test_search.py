@@ -8,6 +8,7 @@ import pytest
 from commissioner.estimation.fit import Column, Fit, plain_machine, problem_of
 from commissioner.estimation.numbers import AT
 from commissioner.estimation.record import prepare
+from commissioner.estimation.told import Slopes
 from commissioner.report.running.page import page_of
 from commissioner.running import search as module
 from commissioner.running.causes import CATALOGUE
@@ -30,7 +31,7 @@ def fit_of(problem, chi2, **numbers):
     """A fit that ended at these numbers, each sure to 1e-4, with so much chi-square."""
     machine = plain_machine(list(FOUR.values()), problem.record).with_values(numbers)
     columns = tuple(Column("p", AT[n]) for n in numbers)
-    return Fit(machine, columns, chi2, np.zeros(1000), 1e4 * np.eye(len(columns), 1000), 0.0, 0)
+    return Fit(machine, columns, chi2, np.zeros(1000), Slopes.known(1e4 * np.eye(len(columns), 1000)), 0.0, 0)
 
 
 def searching(problem, monkeypatch, *, ends=None):
