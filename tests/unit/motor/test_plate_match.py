@@ -286,3 +286,12 @@ def test_a_copper_loss_that_is_not_known_at_all_contradicts_no_plate():
     hot = replace(machine, stator_resistance_ohm=2.0 / loss * machine.stator_resistance_ohm)
     assert sure_mismatch(hot, 0.0, plate) is not None
     assert sure_mismatch(hot, hot.stator_resistance_ohm, plate) is None
+
+
+def test_a_resistance_is_taken_for_no_less_than_a_part_of_itself():
+    """Below nothing it would draw 1.69 times the rated current, and contradict this plate for certain."""
+    machine, plate = next((machine, plate) for name, machine, plate in KNOWN if name == "et_19kw")
+    loss = plate_match(machine, plate).copper_loss_ratio
+    hot = replace(machine, stator_resistance_ohm=1.5 / loss * machine.stator_resistance_ohm)
+    assert sure_mismatch(hot, 0.0, plate) is not None
+    assert sure_mismatch(hot, hot.stator_resistance_ohm, plate) is None
