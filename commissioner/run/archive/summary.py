@@ -242,8 +242,15 @@ def _written(records: list[Record]) -> str:
         elif line["kind"] == "snapshot_restored":
             said = RESTORED + _wear(line["record"])
         elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
-            said = f"{OLD_OR_NEW}: read the drive, or `commissioner restore` this run"
+            said = f"{OLD_OR_NEW}{_mixed(line['record'])}: read the drive, or `commissioner restore` this run"
     return said
+
+
+def _mixed(intent: Mapping[str, Any]) -> str:
+    """A drive that takes each value as it is written may hold some of both; one commit of a staged set, or none of it, leaves no such."""
+    values = intent.get("values")
+    is_one_by_one = intent.get("action") == "commit" and isinstance(values, dict) and "commit" not in values
+    return ", or some of each" if is_one_by_one else ""
 
 
 def _kept(report: Any) -> str:

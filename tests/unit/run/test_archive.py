@@ -242,6 +242,12 @@ def test_a_list_says_that_a_run_which_was_cut_off_had_written(folder):
     """Its outcome alone reads as if the drive held what it held before."""
     folder.journal("about_to", {"action": "commit"})
     assert summarise(folder.path).holds == "old or new"
+    folder.journal("about_to", {"action": "commit", "values": {"stator_resistance": 3.2, "leakage_inductance": 0.02}})
+    assert (
+        summarise(folder.path).written.startswith("old or new, or some of each:") and summarise(folder.path).is_unknown
+    )
+    folder.journal("about_to", {"action": "commit", "values": {"commit": 0xC0DE}})
+    assert summarise(folder.path).written.startswith("old or new:")
     folder.journal("parameters_written", {"is_stored": True})
     assert (summarise(folder.path).outcome, summarise(folder.path).holds) == ("cut off", "new")
     folder.journal("run_ended", {"outcome": "commissioned"})
