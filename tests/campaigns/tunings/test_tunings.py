@@ -148,6 +148,7 @@ def test_a_write_back_is_taken_back_from_a_drive_that_shows_it_late(name):
     with pytest.raises(WriteBackFailed, match="verified") as failed:
         inverter.write_parameters({"stator_resistance": 0.9 * snapshot.in_use["stator_resistance"]}, snapshot)
     assert failed.value.was_restored
+    assert "shows it late" in failed.value.remedy and "settle_s" in failed.value.remedy
     clock.sleep(LONGER_THAN_ANY_SETTLES_S)
     assert drive.truth()["held"] == before
 
