@@ -99,14 +99,14 @@ class _Awaited:
 
     def _not_begun(self, seen: int) -> CommissionerError:
         """Of a start that nobody answered the link is what failed."""
-        remedy = "the start is not repeated: look at the drive, then tune again"
         if self._lost is None:
             return Aborted(
-                "the drive did not begin to tune", step="tune: await", value=seen, limit=f"another status within {BEGIN_S:g} s", remedy=remedy
+                "the drive did not begin to tune", step="tune: await", value=seen, limit=f"another status within {BEGIN_S:g} s",
+                remedy="the start is not repeated: look at the drive, then tune again",
             )  # fmt: skip
         return DriveFault(
             "the drive did not answer the command to tune, and did not begin", step="tune: await", value=self._lost.value,
-            limit=self._lost.limit, remedy=f"{remedy}; {self._lost.remedy}",
+            limit=self._lost.limit, remedy=f"the start is not repeated: look at the drive, then tune again; {self._lost.remedy}",
         )  # fmt: skip
 
 
