@@ -15,6 +15,14 @@ def plain_name(item: str) -> str:
     return item.replace("_", " ")
 
 
+def in_words(name: str) -> tuple[str, str]:
+    """What it is and its unit: `load_torque_ripple_nm` as ("load torque ripple", "N m")."""
+    for ending, unit in (("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%")):
+        if name.endswith(ending):
+            return plain_name(name.removesuffix(ending)), unit
+    return plain_name(name), ""
+
+
 def drive_words(drive_type: str, serial_number: int | None) -> str:
     """`SIM-INV-7A #4711`; a number that is not known is said to be so, never shown as 0."""
     return f"{drive_type}, serial number unknown" if serial_number is None else f"{drive_type} #{serial_number}"

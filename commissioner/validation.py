@@ -135,13 +135,15 @@ def _limit(problem: Mapping[str, Any], unit: str) -> str:
         case "literal_error":
             return f"one of {bound['expected']}"
         case "string_too_short":
-            return f"text of at least {bound['min_length']} characters"
+            least = bound["min_length"]
+            return "text, not empty" if least == 1 else f"text of at least {least} characters"
         case "string_too_long":
             return f"text of at most {bound['max_length']} characters"
         case "string_pattern_mismatch":
             return f"text of the form {bound['pattern']}"
         case "too_short":
-            return f"at least {bound['min_length']} entries"
+            least = bound["min_length"]
+            return "at least one entry" if least == 1 else f"at least {least} entries"
         case "too_long":
             return f"at most {bound['max_length']} entries"
     return ""

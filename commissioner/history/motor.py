@@ -12,7 +12,8 @@ from commissioner.history.series import FALSE_ALARM, LEAST, Array, Judged, judge
 from commissioner.identify.estimate.axes import TEMPERATURE_K, scatter
 from commissioner.identify.estimate.common_ground import CommonGround, Result, at_one_flux, at_temperature
 from commissioner.motor.circuit import PARAMETERS, QUANTILE
-from commissioner.motor.quantities import places
+from commissioner.motor.quantities import places, quantity_of
+from commissioner.records import in_words
 
 YEAR_S = 365.25 * 86400.0
 LEAST_SPAN_S = 7 * 86400.0
@@ -174,11 +175,8 @@ def in_percent(share: float, std: float) -> str:
 def _words(trends: Sequence[Trend], false_alarm: float) -> tuple[str, ...]:
     said = []
     for trend in trends:
-        spoken = (
-            trend.name.rpartition("_")[0].replace("_", " ")
-            if trend.unit in ("ohm", "H")
-            else trend.name.replace("_", " ")
-        )
+        quantity = quantity_of(trend.name)
+        spoken = in_words(trend.name)[0] if quantity is None else quantity.words
         for step in trend.steps:
             said.append(
                 f"{spoken} has moved by {in_percent(step.relative_change, step.relative_std)} from {step.run} on "

@@ -36,14 +36,21 @@ FOUR = FIVE[:4]
 FIELDS = tuple(q.field for q in FIVE)
 
 
+def quantity_of(field: str) -> Quantity | None:
+    """One of the five; None of another field."""
+    return next((q for q in FIVE if q.field == field), None)
+
+
 def field_name(field: str) -> str:
     """`stator resistance R_s` of `stator_resistance_ohm`; another name as it is."""
-    return next((q.name for q in FIVE if q.field == field), field)
+    quantity = quantity_of(field)
+    return field if quantity is None else quantity.name
 
 
 def in_shown_unit(field: str, *values: float) -> str:
     """SI values of one of the five as people read them: `214 mH`, `4 ... 90 mH`."""
-    quantity = next(q for q in FIVE if q.field == field)
+    quantity = quantity_of(field)
+    assert quantity is not None
     return f"{' ... '.join(four_digits(quantity.factor * value) for value in values)} {quantity.unit}"
 
 

@@ -15,6 +15,21 @@ class WarmingUp:
 
 
 @dataclass(frozen=True)
+class LeftUnfinished:
+    """`run` was killed in the middle of writing into this drive, which nobody has restored since."""
+
+    run: str
+
+    @property
+    def sentence(self) -> str:
+        """Also what it means for the set that the run which tells it keeps as the one before."""
+        return (
+            f"{self.run} was cut off while it wrote into this drive: what this run finds there, and would restore, may be old values, new ones "
+            f"or some of each; `commissioner restore {self.run}` brings back those before both"
+        )
+
+
+@dataclass(frozen=True)
 class Diagnosing:
     """The run is over and saved; its samples are looked through for what a simulation would get wrong."""
 

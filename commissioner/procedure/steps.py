@@ -23,6 +23,7 @@ from commissioner.procedure.checks import CheckResult, check_failed, judge_drive
 from commissioner.procedure.findings import (
     ChecksJudged,
     DriveIdentified,
+    LeftUnfinished,
     LinkPlanned,
     RunEnded,
     StateEntered,
@@ -63,6 +64,8 @@ class Findings:
     """What one run has learnt so far; the report is made from it however the run ends."""
 
     identity: DriveIdentity | None = None
+    left_unfinished: LeftUnfinished | None = None
+    """By an earlier run on this drive."""
     link: LinkPlan = field(default_factory=LinkPlan)
     snapshot: ParameterSnapshot | None = None
     checks: tuple[CheckResult, ...] = ()
@@ -93,6 +96,11 @@ class Findings:
     plate_match: PlateMatch | None = None
     """Of the combined values."""
     written: tuple[WrittenParameter, ...] = ()
+
+    @property
+    def of_the_archive(self) -> tuple[str, ...]:
+        """Remarks that no sample tells, so that no replay comes to them."""
+        return () if self.left_unfinished is None else (self.left_unfinished.sentence,)
 
     @property
     def inverter(self) -> InverterError:

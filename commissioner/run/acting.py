@@ -59,6 +59,7 @@ class _Memory:
     """A port on registers that hold what was written."""
 
     read_retries = 0
+    patience_s = 0.0
     reply_timeout_s = 0.0
 
     def __init__(self) -> None:

@@ -18,8 +18,9 @@ from commissioner.link.wire.url import parse_url, without_secrets
 from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.energised.excite import warm_up
-from commissioner.procedure.findings import RunEnded, WarmingUp
+from commissioner.procedure.findings import LeftUnfinished, RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
+from commissioner.records import DriveIdentity
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.summary import summarise
@@ -29,6 +30,7 @@ from commissioner.run.archive.report import write_report
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
+from commissioner.run.holding.unfinished import left_unfinished
 from commissioner.run.job import bounds, make_job, names_of, open_drive, watch_limits
 from commissioner.run.runner import Course, Present, Runner, kind_of
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop
@@ -57,6 +59,13 @@ class Order:
         }  # fmt: skip
         folder.save("request.json", request | more)
         return folder
+
+    def tell_unfinished(self, folder: RunFolder, identity: DriveIdentity, present: Present) -> LeftUnfinished | None:
+        """What an earlier run left in the middle of this drive, journalled and told before anything changes it."""
+        left = left_unfinished(folder.path.parent, without_secrets(self.url), identity)
+        if left is not None:
+            tell(folder, present, left)
+        return left
 
 
 @dataclass(frozen=True)
@@ -107,7 +116,7 @@ def commission(
         folder = order.open_folder(runs, lock, **({"origin": origin.facts} if origin.facts else {}))
         with closing(folder), asked, stopped_by_file(folder.path, asked):
             origin.begun(folder.path)
-            _tell(folder, present, WarmingUp())
+            tell(folder, present, WarmingUp())
             with suppress(Abandoned), asked.computing():
                 warm_up(nameplate)
             ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
@@ -116,8 +125,8 @@ def commission(
     return Commissioned(ended, folder.path, result)
 
 
-def _tell(folder: RunFolder, present: Present, state: WarmingUp) -> None:
-    """A state in which nothing is energised: to the journal, which others follow, and to the screen."""
+def tell(folder: RunFolder, present: Present, state: WarmingUp | LeftUnfinished) -> None:
+    """What is told while nothing is energised: to the journal, which others follow, and to the screen."""
     note(folder, kind_of(state), state)
     with suppress(Exception):
         present(state)
@@ -148,7 +157,9 @@ def carry_out(
             job = make_job(profile, order.nameplate, order.plan, port, write_back=order.write_back)
             folder.journal(kind, job, durable=True)
             with Mastery(inverter, lock) as mastery:
-                mastery.take(inverter.identify())
+                identity = inverter.identify()
+                mastery.take(identity)
+                findings.left_unfinished = order.tell_unfinished(folder, identity, present)
                 runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
                 ended = runner.perform(steps(job, findings))
             with suppress(OSError):
@@ -188,7 +199,7 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
     result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names_of(order.profile)))
-    result["remarks"] = [*result["remarks"], *plate_doubts(order.nameplate)]
+    result["remarks"] = [*result["remarks"], *plate_doubts(order.nameplate), *findings.of_the_archive]
     write_report(folder, result, findings)
     folder.cover()
     return result

@@ -50,10 +50,10 @@ def test_nothing_is_energised_unless_told(drive):
     assert answer.json["energised"] is False
 
 
-def test_what_waits_for_a_voltage_is_told_once_and_each_by_name():
+def test_what_waits_for_a_voltage_is_told_once_and_with_all_each_by_name():
     """44 rules said the same sentence, and what was found lay above three screens of it."""
     with SimProcess("--scenario", "default", "--tcp", "0") as sim:
-        told = call("drives", "conformance", sim.url).stdout
+        told = call("drives", "conformance", sim.url, "--all").stdout
     assert told.count("give --energise") == 1
     assert {rule.name for rule in RULES} <= set(told.replace(",", " ").split())
 

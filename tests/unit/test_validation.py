@@ -50,7 +50,7 @@ class Table(Inner):
         ({"inner": {"is_on": "perhaps"}}, "inner.is_on", "is on: true or false"),
         ({"inner": {"hold_s": 0.0}}, "inner.hold_s", "hold: above 0 s"),
         ({"inner": {"hold_s": float("inf")}}, "inner.hold_s", "hold: a finite number in s"),
-        ({"inner": {"names": []}}, "inner.names", "names: at least 1 entries"),
+        ({"inner": {"names": []}}, "inner.names", "names: at least one entry"),
         ({"inner": {"names": ["a", "b", "c"]}}, "inner.names", "names: at most 2 entries"),
         ({"inner": {"names": "a"}}, "inner.names", "names: a list"),
         ({"axes_deg": 5}, "axes_deg", "axes: a list"),

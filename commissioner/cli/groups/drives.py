@@ -70,6 +70,9 @@ def drives_conformance(
     rule: Annotated[list[str] | None, typer.Option("--rule", help="Only this rule; repeatable.")] = None,
     reply_timeout: Annotated[float, typer.Option(help="Seconds after which an answer counts as missing.")] = 0.5,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Name the rules, too, that share a reason for not being tried.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Every rule of the commissioning map against somebody's firmware: pass, fail or not tested, with the evidence.
@@ -85,5 +88,6 @@ def drives_conformance(
         rules=tuple(rule or ()),
         reply_timeout_s=reply_timeout,
         yes=yes,
+        names_all=every,
         as_json=json,
     )

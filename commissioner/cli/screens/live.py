@@ -42,6 +42,8 @@ class LiveView:
         match record:
             case told.WarmingUp():
                 self._line("[dim]preparing the observer (compiles on the first run, about a minute)[/]")
+            case told.LeftUnfinished(sentence=sentence):
+                self._line(f"    [yellow]{escape(sentence)}[/]")
             case told.Diagnosing(seconds=seconds):
                 self._line(
                     f"[bold]diagnosing the samples[/]  [dim]the drive is let go; at most {seconds:.0f} s, Ctrl-C ends it[/]"

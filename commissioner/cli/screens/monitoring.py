@@ -10,9 +10,8 @@ from rich.console import Console
 from commissioner.cli.screens.screen import SENTENCE, err, out, quantity, table, text
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
-from commissioner.monitor.trend.indicators import in_words
 from commissioner.monitor.trend.trend import Verdict
-from commissioner.records import RPM
+from commissioner.records import RPM, in_words
 from commissioner.report.sheet.numbers import half_width
 
 SHOWN = (

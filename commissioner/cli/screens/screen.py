@@ -107,12 +107,12 @@ def failure(error: CommissionerError) -> None:
 
 _SIGNS = (
     (r"\+-", "±"), (r"->", "→"), (r"\b([LT])_sigma\b", r"\1_σ"), (r"(\d) us\b", r"\1 µs"), (r"(\d) ohm\b", r"\1 Ω"),
-    (r"(\d) deg\b", r"\1°"),
+    (r"(\d) deg\b", r"\1°"), *((rf"\b{q.field}\b", q.name) for q in FIVE),
 )  # fmt: skip
 
 
 def signs(sentence: str) -> str:
-    """A document's sentence with the signs that the tables beside it have; a console that lacks them spells them out."""
+    """A document's sentence with the names and signs that the tables beside it have; a console that lacks them spells them out."""
     for spelt, sign in _SIGNS:
         sentence = re.sub(spelt, sign, sentence)
     return sentence
@@ -223,12 +223,12 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     """A run's result as the technician reads it; `standing_now` where something has happened since."""
 
     out.print()
-    out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
+    out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(signs(str(document['reason'])))}")
     error = document.get("error")
     if error:
         for name in ("step", "value", "limit", "remedy"):
             if error.get(name) not in (None, ""):
-                out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name], error.get('unit', '')))}")
+                out.print(f"  [dim]{name:<7}[/]{escape(signs(shown(error[name], error.get('unit', ''))))}")
     if document.get("parameters"):
         out.print(
             table(

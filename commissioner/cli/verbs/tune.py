@@ -13,6 +13,7 @@ from commissioner.cli.screens.ending import EXIT_CODES, show_and_exit
 from commissioner.errors import UsageError
 from commissioner.operations.tune import TunedOnce, TuneRequest, TuningBegan, check_request
 from commissioner.operations.tune import tune as carry_out
+from commissioner.procedure.findings import LeftUnfinished
 from commissioner.records import plain_name
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
@@ -114,6 +115,8 @@ def _quiet(_: object) -> None:
 
 def _show(record: object) -> None:
     match record:
+        case LeftUnfinished(sentence=sentence):
+            screen.out.print(f"[yellow]{screen.text(sentence)}[/]")
         case TuningBegan(number=number, of=of):
             screen.out.print(f"tuning {number} of {of} ...")
         case TunedOnce(tuned=tuned):

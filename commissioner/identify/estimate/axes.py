@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
+from commissioner.motor.quantities import field_name
 
 Matrix = NDArray[np.float64]
 SIGNIFICANCE = 0.01
@@ -262,10 +263,14 @@ def compare(
         Identity.SAME,
         changes,
         limit_sigmas,
-        f"largest difference {changes[0].sigmas:.1f} sigma, {changes[0].parameter}",
+        f"largest difference {_in_errors(changes[0])}, {field_name(changes[0].parameter)}",
     )
 
 
 def _sentence(changes: Sequence[Change], limit: float) -> str:
     beyond = [c for c in changes if c.sigmas > limit]
-    return ", ".join(f"{c.parameter} {c.relative_change:+.1%} ({c.sigmas:.1f} sigma)" for c in beyond)
+    return ", ".join(f"{field_name(c.parameter)} {100 * c.relative_change:+.1f} % ({_in_errors(c)})" for c in beyond)
+
+
+def _in_errors(change: Change) -> str:
+    return f"{change.sigmas:.1f} standard errors"

@@ -12,6 +12,12 @@ from commissioner.registers.profile import ParameterGroup, Store
 Values = Mapping[str, float]
 
 
+SHOWS_THE_OLD = (
+    "it shows what stood there before the write: it did not take the value, or shows it late; look at its display after a minute, and where the "
+    "new value stands there, give that time as parameters.settle_s in the drive file"
+)
+
+
 class ParameterSets:
     """Reads both sets, compares in the drive's own resolution, completes a wish."""
 
@@ -74,8 +80,14 @@ class ParameterSets:
             encode_item(self.profile.item(prefix + name), value)
         return dict(present) | dict(values)
 
-    def verify(self, wanted: Mapping[str, Value], seen: Mapping[str, Value], step: str) -> None:
-        """DriveFault where the drive holds something else."""
+    def verify(
+        self,
+        wanted: Mapping[str, Value],
+        seen: Mapping[str, Value],
+        step: str,
+        before: Mapping[str, Value] | None = None,
+    ) -> None:
+        """DriveFault where the drive holds something else. `before`: as it stood before the write."""
         for name, value in wanted.items():
             if not self.items.same_words(name, seen[name], value):
                 raise DriveFault(
@@ -83,7 +95,9 @@ class ParameterSets:
                     step=step,
                     value=seen[name],
                     limit=value,
-                    remedy="the drive limits, rounds or recomputes the value; see its manual",
+                    remedy=SHOWS_THE_OLD
+                    if before is not None and self.items.same_words(name, seen[name], before[name])
+                    else "the drive limits, rounds or recomputes the value; see its manual",
                 )
 
     def _read(self, prefix: str) -> dict[str, float]:

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 
 from commissioner.errors import DriveFault, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.facts import Action, Intent, Journal
+from commissioner.link.drive.ordinary.insisting import insist
 from commissioner.link.drive.ordinary.unlocking import unlocked
 from commissioner.link.drive.parameter_sets import ParameterSets, Values
 from commissioner.registers.codec import Value
@@ -162,7 +163,7 @@ class Direct:
         try:
             yield
         finally:
-            port.write_coil(coil, before)
+            insist(lambda: port.write_coil(coil, before))
 
     def _await_stored(self, address: int, value: int, within_s: float) -> None:
         end = self._clock() + within_s

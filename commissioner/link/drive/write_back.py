@@ -86,7 +86,7 @@ class WriteBack:
                 step="restore",
                 value=error.value,
                 limit=error.limit,
-                remedy="run restore again; until then the drive's parameters are not known",
+                remedy=f"run restore again, until then the drive's parameters are not known; {error.remedy}",
             ) from error
 
     def _check_present(
@@ -116,7 +116,7 @@ class WriteBack:
                 step="write parameters",
                 value=status.state,
                 limit="a stopped drive",
-                remedy="stop the motor first",
+                remedy="stop the motor first, at the drive or by its hard-wired stop",
             )
         if not status.interlocks.get("remote_control", True):
             raise CheckFailed(
@@ -169,12 +169,13 @@ class WriteBack:
     # --- act ----------------------------------------------------------------------------------------------------
     def _bring(self, target: Values, *, store: bool, always: bool = False) -> None:
         """`target` in use and, if asked, stored; verified; only what differs."""
-        has_changed = bool(self._sets.differing(target, self._sets.in_use()))
+        held = self._sets.in_use()
+        has_changed = bool(self._sets.differing(target, held))
         if has_changed:
             before = self._fault()
             self._way.put_in_use(target, store=store)
             self._settle(before)
-            self._sets.verify(target, self._sets.in_use(), "read back the values in use")
+            self._sets.verify(target, self._sets.in_use(), "read back the values in use", before=held)
         is_unstored = (
             bool(self._sets.differing(target, self._sets.stored())) if self._sets.group.is_staged else has_changed
         )

@@ -35,6 +35,7 @@ class InProcessPort:
     """`Port` to a simulator. What is lost on a wire is not lost here; a refusal is one all the same."""
 
     read_retries = 0
+    patience_s = 0.0
     reply_timeout_s = 0.25
 
     def __init__(self, simulator: Simulator) -> None:

@@ -17,7 +17,7 @@ from pymodbus.pdu import ModbusPDU
 from commissioner.errors import CommissionerError, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.debts import Shape
-from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, LinkStats, Words
+from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, LinkStats, Words, ask_again
 from commissioner.link.wire.trust import ConnectionTrust, SerialTrust, Trust, longest_frames_s
 from commissioner.link.wire.unopened import unopened
 from commissioner.link.wire.url import DriveUrl, RtuUrl
@@ -94,6 +94,7 @@ class ModbusPort:
     ) -> None:
         self.stats = LinkStats()
         self.read_retries = 1
+        self.patience_s = 0.0
         self.reply_timeout_s = reply_timeout_s
         self._connect_timeout_s = connect_timeout_s
         self._url, self._profile = url, profile
@@ -118,12 +119,10 @@ class ModbusPort:
 
     # --- the port -------------------------------------------------------------------------------------------------
     def read(self, address: int, count: int) -> Words:
-        for _ in range(self.read_retries):
-            try:
-                return self._trusted(lambda: self._ask_apart(address, count), repeats=True)
-            except (ReplyTimeout, ReplyMismatch):
-                continue
-        return self._trusted(lambda: self._ask_apart(address, count), repeats=True)
+        return ask_again(
+            lambda: self._trusted(lambda: self._ask_apart(address, count), repeats=True),
+            self.read_retries, self.patience_s, self._clock,
+        )  # fmt: skip
 
     def write_register(self, address: int, values: Sequence[int]) -> None:
         """One register by function 6, whatever the drive file says."""

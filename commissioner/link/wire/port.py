@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
+from commissioner.errors import ReplyMismatch, ReplyTimeout
+
 Words = tuple[int, ...]
+T = TypeVar("T")
+MOST_AGAIN = 5
+"""Times that a read is asked again while there is patience."""
 MAY_BE_CARRIED_OUT = frozenset({5, 11})
 """Still at work, or no answer from behind a gateway: only what may be repeated without harm is asked again."""
 
@@ -58,16 +63,31 @@ class LinkStats:
         }
 
 
+def ask_again(ask: Callable[[], T], least: int, patience_s: float, now_s: Callable[[], float]) -> T:
+    """`ask`, which only reads, again where its answer was lost: `least` times whatever it takes, and more often, MOST_AGAIN times, while
+    `patience_s` have not passed since it was asked first. A damaged answer is known at once, one that nobody sends only after its time."""
+    until_s = now_s() + patience_s
+    again = 0
+    while True:
+        try:
+            return ask()
+        except (ReplyTimeout, ReplyMismatch):
+            if again >= least and (again >= MOST_AGAIN or now_s() >= until_s):
+                raise
+        again += 1
+
+
 class Port(Protocol):
     """Registers over some wire. One owner, no threads; every call ends within the deadline or raises a LinkError.
 
-    No call is ever repeated, except a read, at most `read_retries` times; a write or an exchange never. What was refused as
+    No call is ever repeated, except a read, by `ask_again` with `read_retries` and `patience_s`; a write or an exchange never. What was refused as
     busy was not carried out, and is asked again for as long as a reply may take; exceptions 5 and 11 only where twice does
     no harm (reads, exchanges).
     """
 
     stats: LinkStats
     read_retries: int
+    patience_s: float
     reply_timeout_s: float
 
     def read(self, address: int, count: int) -> Words:

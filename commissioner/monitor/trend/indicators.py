@@ -18,7 +18,7 @@ from commissioner.monitor.machine.inversion import SpeedLines, basis_of, torque_
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.running import TCircuit, stator_impedance
-from commissioner.records import Signal, plain_name
+from commissioner.records import Signal
 
 POINTS = 720
 SENSOR_NOISE = 0.15
@@ -54,14 +54,6 @@ class Indicator:
     quantity: Quantity
     noise_std: float
     unit: str
-
-
-def in_words(name: str) -> tuple[str, str]:
-    """What it is and its unit: `load_torque_ripple_nm` as ("load torque ripple", "N m")."""
-    for ending, unit in (("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%")):
-        if name.endswith(ending):
-            return plain_name(name.removesuffix(ending)), unit
-    return plain_name(name), ""
 
 
 def pulses(observation: Observation) -> Pulses | None:

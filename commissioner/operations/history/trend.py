@@ -11,13 +11,13 @@ from commissioner.monitor.trend.trend import is_same_point
 from commissioner.operations.history.motors import runs_of
 from commissioner.operations.history.runs import Archive
 from commissioner.recordings.baseline import read
+from commissioner.records import in_words
 from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.verify import changed
 from commissioner.run.index.results import has_result
 from commissioner.run.index.years import measured_in, seconds
 
 PICTURES = (".svg", ".png")
-UNITS = {"rad_per_s": "rad/s", "nm": "N m", "percent": "%"}
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,7 @@ def trend_of_indicators(baseline: Path, picture: Path | None = None) -> MotorTre
         ]
         for name in names
     }
-    found = indicator_trends(
-        series, {name: next((unit for end, unit in UNITS.items() if name.endswith(end)), "") for name in names}
-    )
+    found = indicator_trends(series, {name: in_words(name)[1] for name in names})
     return MotorTrend(baseline.stem, found, left_out, _draw(baseline.stem, found, picture))
 
 

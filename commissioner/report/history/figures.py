@@ -9,15 +9,12 @@ import numpy as np
 
 from commissioner.history.motor import Trend, Trends
 from commissioner.motor.circuit import QUANTILE
+from commissioner.motor.quantities import quantity_of
+from commissioner.records import in_words
 from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, RED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-LABELS = {
-    "stator_resistance_ohm": ("R_s / Ω", 1.0), "rotor_resistance_ohm": ("R_R / Ω", 1.0),
-    "leakage_inductance_h": ("L_σ / mH", 1e3), "magnetizing_inductance_h": ("L_M / mH", 1e3),
-}  # fmt: skip
 
 
 def over_years(title: str, found: Trends) -> Figure:
@@ -43,9 +40,10 @@ def over_years(title: str, found: Trends) -> Figure:
 
 
 def _panel(panel: Any, trend: Trend) -> None:
-    label, factor = LABELS.get(
-        trend.name, (f"{trend.name.replace('_', ' ')}{f' / {trend.unit}' if trend.unit else ''}", 1.0)
-    )
+    quantity = quantity_of(trend.name)
+    factor = 1.0 if quantity is None else quantity.factor
+    name, unit = (in_words(trend.name)[0], trend.unit) if quantity is None else (quantity.symbol, quantity.unit)
+    label = f"{name} / {unit}" if unit else name
     has_dates = bool(trend.points) and min(point.time_s for point in trend.points) > 1e6
     time = np.array([point.time_s for point in trend.points])
     shown: Any = (time * 1e6).astype("datetime64[us]") if has_dates else time

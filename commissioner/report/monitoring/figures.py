@@ -9,10 +9,10 @@ import numpy as np
 
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.periods.periods import SIGNIFICANT, VISIBLE
-from commissioner.monitor.trend.indicators import Indicator, Pulses, in_words
+from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import History, Verdict
 from commissioner.motor.circuit import QUANTILE
-from commissioner.records import RPM, Signal
+from commissioner.records import RPM, Signal, in_words
 from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, RULE, figure_of, told_apart
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import Any
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.result import why_no_load_torque
-from commissioner.monitor.trend.indicators import Indicator, Pulses, in_words
+from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import FALSE_ALARM, History, Verdict
 from commissioner.motor.quantities import FIVE
-from commissioner.records import RPM
+from commissioner.records import RPM, in_words
 from commissioner.report import band
 from commissioner.report.monitoring import figures
 from commissioner.report.page import Page, Section, Table, Tone, picture

@@ -19,7 +19,7 @@ NOT_KEPT = frozenset({"folder", "result"})
 """Fields of a summary that `summary.json` is without: where the folder lies, the whole result."""
 NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
-AS_BEFORE, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before", "old or new", "cut off", "unreadable"
+AS_BEFORE, OLD_OR_NEW, NEW, CUT_OFF, UNREADABLE = "as before", "old or new", "new", "cut off", "unreadable"
 RESTORED = f"{AS_BEFORE} (restored)"
 STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, UNSURE, "rejected", "aborted", "faulted", CUT_OFF, UNREADABLE)
 """How a run can have ended, or stand."""
@@ -77,7 +77,15 @@ class RunSummary:
             return UNSURE
         if self.written.startswith(RESTORED):
             return RESTORED_SINCE
-        return "commissioned" if self.written.startswith("new") else ACCEPTED
+        return "commissioned" if self.written.startswith(NEW) else ACCEPTED
+
+    @property
+    def holds(self) -> str:
+        """What the drive holds, where the outcome alone would let one think otherwise: new values behind a run that was cut off after it
+        had written them; else empty."""
+        if self.is_unknown:
+            return OLD_OR_NEW
+        return NEW if self.outcome != "commissioned" and self.written.startswith(NEW) else ""
 
     @property
     def is_unknown(self) -> bool:
@@ -208,6 +216,8 @@ def _drive(identity: Record) -> str:
 
 def _last_state(records: list[Record]) -> str:
     """How far a run came whose process ended before it could say so."""
+    if _of(records, "parameters_written"):
+        return "the process ended after the parameters had been written back"
     states = [record.get("state") for record in _of(records, "state_entered")]
     last = next((line["kind"] for line in reversed(records) if line["kind"] in _TUNINGS), "")
     if last in ("tuning_began", "tuned_once"):
@@ -228,12 +238,19 @@ def _written(records: list[Record]) -> str:
     said = AS_BEFORE
     for line in records:
         if line["kind"] == "parameters_written":
-            said = "new" + _kept(line["record"]) + _wear(line["record"])
+            said = NEW + _kept(line["record"]) + _wear(line["record"])
         elif line["kind"] == "snapshot_restored":
             said = RESTORED + _wear(line["record"])
         elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
-            said = f"{OLD_OR_NEW}: read the drive, or `commissioner restore` this run"
+            said = f"{OLD_OR_NEW}{_mixed(line['record'])}: read the drive, or `commissioner restore` this run"
     return said
+
+
+def _mixed(intent: Mapping[str, Any]) -> str:
+    """A drive that takes each value as it is written may hold some of both; one commit of a staged set, or none of it, leaves no such."""
+    values = intent.get("values")
+    is_one_by_one = intent.get("action") == "commit" and isinstance(values, dict) and "commit" not in values
+    return ", or some of each" if is_one_by_one else ""
 
 
 def _kept(report: Any) -> str:

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 from commissioner.encoding import plain
 from commissioner.motor.quantities import plate_words
-from commissioner.run.archive.summary import NOT_KEPT, OLD_OR_NEW, RunSummary, motor_names
+from commissioner.run.archive.summary import NOT_KEPT, RunSummary, motor_names
 
-SCHEMA = 2
+SCHEMA = 3
 """Of an index, raised with every change of what a row holds; an earlier one is filled anew from the folders."""
 CREATE = (
     "CREATE TABLE runs (place TEXT NOT NULL, run TEXT NOT NULL, folder TEXT NOT NULL, journal_bytes BIGINT NOT NULL, "
@@ -30,7 +30,7 @@ CREATE = (
 
 class Row(NamedTuple):
     """One run. `place`: the archive that holds it; `motor`: the tag or serial number a person gave, else empty; `plate`: the rated
-    values in words and the name they were given under; `holds`: "old or new" where only the drive knows; `document`: the summary as JSON text."""
+    values in words and the name they were given under; `holds`: as the summary's; `document`: the summary as JSON text."""
 
     place: str
     run: str
@@ -139,7 +139,7 @@ def row_of(summary: RunSummary, place: str, stamp: tuple[int, int]) -> Row:
     document = _rounded(plain(summary, without=NOT_KEPT)) | {"folder": summary.folder, "standing": summary.standing}
     return Row(
         place, summary.run, summary.folder, *stamp, summary.started_utc or utc_of(summary.run), summary.outcome, summary.standing,
-        summary.reason, summary.drive, OLD_OR_NEW if summary.is_unknown else "", summary.person, summary.motor_id,
+        summary.reason, summary.drive, summary.holds, summary.person, summary.motor_id,
         summary.motor_serial, ", ".join(filter(None, (plate_words(summary.motor), summary.motor_name))), json.dumps(document, separators=(",", ":"), allow_nan=False),
     )  # fmt: skip
 

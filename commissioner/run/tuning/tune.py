@@ -236,6 +236,7 @@ class _Run:
         self._found.common.identity = identity
         told = DriveIdentified(**{f.name: getattr(identity, f.name) for f in dataclasses.fields(DriveIdentified)})
         self._folder.journal("drive_identified", told, durable=True)
+        self._found.common.left_unfinished = self._wanted.order.tell_unfinished(self._folder, identity, self._present)
         return identity
 
     def _all(self, inverter: Inverter) -> None:
@@ -476,7 +477,12 @@ def _save(order: Order, folder: RunFolder, found: TuneFindings, ended: RunEnded)
         in_the_drive=found.in_the_drive,
     )
     document["objections"] = found.verdict.objections if found.verdict else ()
-    document["remarks"] = [*plate_doubts(order.nameplate), f"tuning: {tuning.proof}", *found.remarks]
+    document["remarks"] = [
+        *plate_doubts(order.nameplate),
+        f"tuning: {tuning.proof}",
+        *found.remarks,
+        *found.common.of_the_archive,
+    ]
     result = plain(document)
     write_report(folder, result, found.common)
     folder.cover()

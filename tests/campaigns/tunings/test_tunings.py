@@ -4,12 +4,13 @@ The whole campaign: python -m tests.campaigns.tunings.cases --seeds 4
 """
 
 import errno
+import struct
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from commissioner.errors import CheckFailed, IdentityMismatch, WriteBackFailed
+from commissioner.errors import CheckFailed, IdentityMismatch, ReplyTimeout, WriteBackFailed
 from commissioner.link.drive.facts import Action
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
@@ -47,6 +48,54 @@ def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path):
         described("tune", {**tried.done.result, "folder": str(tried.done.folder)})
         bench.take_back(tmp_path / Path(name).stem, tried.drive, tried.person.clock)
         assert tried.drive.truth()["held"] == tried.before, name
+
+
+REMOTE = [name for name in names() if load_profile(name).tuning.form == "remote"]
+
+
+def losing(monkeypatch, times, is_lost):
+    """A link that takes along, before the drive sees them, the first `times` requests of which `is_lost` is true."""
+    lost = []
+
+    class LosingPort(bench.VendorPort):
+        def _ask_once(self, pdu):
+            if len(lost) < times and is_lost(pdu):
+                lost.append(pdu)
+                self._clock.sleep(self.reply_timeout_s)
+                raise ReplyTimeout("no answer", step="request", value="silence", limit="an answer", remedy="the cable")
+            return super()._ask_once(pdu)
+
+    monkeypatch.setattr(bench, "VendorPort", LosingPort)
+    return lost
+
+
+def written_by(name, steps):
+    """The requests that these steps of the drive's file write."""
+    item = load_profile(name).item
+    return {struct.pack(">BHH", 6, item(s.item).address, s.value) for s in steps if s.do == "write"}
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("name", REMOTE)
+def test_a_stop_that_the_link_takes_along_is_asked_for_again(name, times, tmp_path, monkeypatch):
+    """A reset of the connection in that one request left the output on, with a link that worked again."""
+    stops = written_by(name, load_profile(name).tuning.finally_)
+    lost = losing(monkeypatch, times, stops.__contains__)
+    tried = bench.try_tune(name, tmp_path, repeat=1, power_cycle=False)
+    assert len(lost) == times
+    assert tried.done.ended.outcome == "commissioned"
+    assert not tried.truth["is_energised"]
+
+
+@pytest.mark.parametrize("name", REMOTE)
+def test_a_start_that_the_link_takes_along_is_the_links_fault_and_not_repeated(name, tmp_path, monkeypatch):
+    starts = written_by(name, [step for step in load_profile(name).tuning.steps if step.once])
+    losing(monkeypatch, 1, starts.__contains__)
+    tried = bench.try_tune(name, tmp_path, repeat=1, power_cycle=False)
+    assert tried.done.ended.outcome == "faulted"
+    assert "did not answer the command to tune" in tried.done.ended.reason
+    assert tried.truth["tunings"] == []
+    assert tried.truth["held"] == tried.before
 
 
 LONGER_THAN_ANY_SETTLES_S = 20.0
@@ -91,6 +140,7 @@ def test_a_write_back_is_taken_back_from_a_drive_that_shows_it_late(name):
     with pytest.raises(WriteBackFailed, match="verified") as failed:
         inverter.write_parameters({"stator_resistance": 0.9 * snapshot.in_use["stator_resistance"]}, snapshot)
     assert failed.value.was_restored
+    assert "shows it late" in failed.value.remedy and "settle_s" in failed.value.remedy
     clock.sleep(LONGER_THAN_ANY_SETTLES_S)
     assert drive.truth()["held"] == before
 

@@ -8,6 +8,8 @@ import json
 import numpy as np
 import pytest
 
+from commissioner.cli.screens import screen
+from commissioner.cli.verbs.archived import motors
 from commissioner.errors import DataRefused, UsageError
 from commissioner.history.series import FALSE_ALARM
 from commissioner.identify.estimate.axes import Identity
@@ -15,6 +17,7 @@ from commissioner.operations.history.compare import compare_runs
 from commissioner.operations.history.motors import judge_motor, list_motors, name_motor, runs_of
 from commissioner.operations.history.runs import Archive, Wanted, find_runs
 from commissioner.operations.history.trend import trend, trend_of_indicators
+from commissioner.report.history import figures
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.verify import verify
 from commissioner.run.index.years import over_years
@@ -144,6 +147,19 @@ def test_a_rotor_that_breaks_is_a_step_of_its_resistance_alone_with_picture(tmp_
     code, document = leave(capsys, "runs", "trend", "PUMP-3", "--runs", tmp_path)
     assert code == 0 and json.dumps(document, allow_nan=False)
     assert document["found"]["trends"][1]["steps"][0]["run"] == step.run
+
+
+def test_a_trend_is_shown_in_the_names_and_units_of_every_other_table(tmp_path):
+    for k in range(3):
+        add(tmp_path, k, noisy(k), tag="PUMP-3")
+    done = trend(Archive(tmp_path), "PUMP-3")
+    with screen.out.capture() as shown:
+        motors._show(done)
+    row = next(line for line in shown.get().splitlines() if "L_M" in line)
+    henry = next(one.level for one in done.found.trends if one.name == "magnetizing_inductance_h")
+    assert row.split()[:3] == ["magnetizing", "inductance", "L_M"] and row.split()[7] == "mH"
+    assert float(row.split()[4]) == pytest.approx(1e3 * henry, rel=0.01)
+    assert figures.over_years("PUMP-3", done.found).axes[2].get_ylabel() == "L_σ / mH"
 
 
 def test_runs_without_result_or_temperature_are_said(tmp_path):

@@ -101,7 +101,7 @@ def test_a_refusal_of_the_drives_own_meaning_is_not_answered_by_the_protocols_re
 class Recorded:
     """A port that keeps what was written; after `fails_after` writes each one is refused."""
 
-    read_retries, reply_timeout_s, stats = 1, 0.1, None
+    read_retries, patience_s, reply_timeout_s, stats = 1, 0.0, 0.1, None
 
     def __init__(self, fails_after=99, answers=()):
         self.written, self.left, self.answers, self.asked = [], fails_after, list(answers), 0

@@ -49,6 +49,13 @@ def test_what_holds_for_every_run_is_said_once(monkeypatch):
     assert shown.get().count("no seal") == 1
 
 
+def test_a_verdict_names_parameters_as_the_table_below_it_does():
+    reason = "observer and batch fit disagree on leakage_inductance_h at axis 60 deg"
+    with screen.out.capture() as shown:
+        screen.result({"outcome": "rejected", "reason": reason, "energised_s": 1.0})
+    assert "disagree on leakage inductance L_σ at axis 60°" in " ".join(shown.get().split())
+
+
 def test_one_is_no_plural():
     assert (counted(0, "run"), counted(1, "run"), counted(2, "run")) == ("0 runs", "1 run", "2 runs")
 

@@ -363,10 +363,12 @@ def test_a_scale_outside_the_fraction_never_reaches_the_wire(bench, scale):
 def test_while_energised_no_read_is_repeated_and_afterwards_as_before(bench):
     bench.drive.read_retries = 1
     bench.inverter = Inverter(bench.drive, PROFILE, sleep=bench.sleep, clock=lambda: bench.now)
+    patient_s = bench.drive.patience_s
+    assert patient_s > 2 * bench.drive.reply_timeout_s
     running(bench)
-    assert bench.drive.read_retries == 0
+    assert (bench.drive.read_retries, bench.drive.patience_s) == (0, 0.0)
     assert bench.inverter.disarm().is_confirmed
-    assert bench.drive.read_retries == 1
+    assert (bench.drive.read_retries, bench.drive.patience_s) == (1, patient_s)
 
 
 # --- de-energise --------------------------------------------------------------------------------------------

@@ -7,9 +7,8 @@ import pytest
 
 from commissioner.cli.screens.screen import quantity, share
 from commissioner.monitor.result import cannot_be_fixed
-from commissioner.monitor.trend.indicators import in_words
 from commissioner.monitor.trend.trend import State, Verdict, Watched
-from commissioner.records import RPM
+from commissioner.records import RPM, in_words
 from commissioner.report.monitoring import page
 from commissioner.report.monitoring.figures import resimulation, superimposed
 from commissioner.report.page import BLUE, GREEN, ORANGE, PURPLE, RED

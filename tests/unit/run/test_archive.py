@@ -229,12 +229,29 @@ def test_a_run_that_was_cut_off_says_no_energised_time(tmp_path):
         (["drive_identified", "tuning_began", "tuned_once"], "while the drive tuned itself"),
         (["drive_identified", "tuning_began", "tuning_ended"], "after the drive had tuned itself"),
         (["drive_identified", "tuning_began", "tuned_once", "tunings_judged"], "after the drive had tuned itself"),
+        (["drive_identified", "state_entered", "parameters_written"], "after the parameters had been written back"),
     ],
 )
 def test_a_run_that_was_cut_off_says_how_far_it_came(folder, kinds, says):
     for kind in kinds:
         folder.journal(kind, {"drive_type": "X"})
     assert says in summarise(folder.path).reason
+
+
+def test_a_list_says_that_a_run_which_was_cut_off_had_written(folder):
+    """Its outcome alone reads as if the drive held what it held before."""
+    folder.journal("about_to", {"action": "commit"})
+    assert summarise(folder.path).holds == "old or new"
+    folder.journal("about_to", {"action": "commit", "values": {"stator_resistance": 3.2, "leakage_inductance": 0.02}})
+    assert (
+        summarise(folder.path).written.startswith("old or new, or some of each:") and summarise(folder.path).is_unknown
+    )
+    folder.journal("about_to", {"action": "commit", "values": {"commit": 0xC0DE}})
+    assert summarise(folder.path).written.startswith("old or new:")
+    folder.journal("parameters_written", {"is_stored": True})
+    assert (summarise(folder.path).outcome, summarise(folder.path).holds) == ("cut off", "new")
+    folder.journal("run_ended", {"outcome": "commissioned"})
+    assert summarise(folder.path).holds == ""
 
 
 def test_whoever_shows_an_edited_run_says_so(tmp_path, capsys):

@@ -9,11 +9,12 @@ from typing_extensions import TypedDict
 
 from commissioner.cli.screens import screen
 from commissioner.errors import UsageError
-from commissioner.history.motor import in_percent
-from commissioner.motor.quantities import field_name
+from commissioner.history.motor import Trend, in_percent
+from commissioner.motor.quantities import quantity_of
 from commissioner.operations.history.motors import Likeness, Motor, judge_motor, list_motors, name_motor
 from commissioner.operations.history.runs import Archive
 from commissioner.operations.history.trend import MotorTrend, trend, trend_of_indicators
+from commissioner.records import in_words
 
 
 class KnownMotors(TypedDict):
@@ -99,11 +100,19 @@ def _name(archive: Archive, run: str, tag: str, serial: str, *, confirm: bool, a
         screen.out.print(f"  beside {screen.text(done.likeness.against)}: {done.likeness.comparison.verdict.value}")
 
 
+def _level(one: Trend) -> tuple[str, str, str]:
+    """Name, number of points and level, in words and in the unit that every other table has."""
+    quantity = quantity_of(one.name)
+    name, factor, unit = (
+        (in_words(one.name)[0], 1.0, one.unit) if quantity is None else (quantity.name, quantity.factor, quantity.unit)
+    )
+    return name, str(len(one.points)), screen.quantity(factor * one.level, factor * one.level_std, unit).rstrip()
+
+
 def _show(done: MotorTrend) -> None:
     screen.out.print(f"[bold]{screen.text(done.motor)}[/]")
     rows = [
-        (field_name(one.name), str(len(one.points)), screen.signs(screen.quantity(one.level, one.level_std, one.unit)),
-         "" if one.slope_per_year is None else in_percent(one.slope_per_year, one.slope_std or 0.0),
+        (*_level(one), "" if one.slope_per_year is None else in_percent(one.slope_per_year, one.slope_std or 0.0),
          str(len(one.steps)), "[red]alarm[/]" if one.is_alarm else "")
         for one in done.found.trends
     ]  # fmt: skip

@@ -100,7 +100,7 @@ def _print(summary: RunSummary) -> None:
         screen.outcome_mark(summary.standing),
         " ".join(filter(None, (summary.motor_tag, summary.motor_serial))),
     )
-    screen.out.print(f"[bold]{screen.text(summary.run)}[/]  {mark}  {screen.text(summary.reason)}")
+    screen.out.print(f"[bold]{screen.text(summary.run)}[/]  {mark}  {screen.signs(screen.text(summary.reason))}")
     screen.out.print(
         f"  drive       {screen.text(summary.drive)}\n  motor       {screen.text(motor) or 'nobody said which'}"
     )

@@ -18,9 +18,17 @@ SOME_FAILED = 3
 
 
 def conformance(
-    *, url: str, profile: str, energise: bool, rules: tuple[str, ...], reply_timeout_s: float, yes: bool, as_json: bool
+    *,
+    url: str,
+    profile: str,
+    energise: bool,
+    rules: tuple[str, ...],
+    reply_timeout_s: float,
+    yes: bool,
+    names_all: bool,
+    as_json: bool,
 ) -> None:
-    """Prints every rule as it ends; exits with 3 where one failed."""
+    """Prints every rule that was tried as it ends, and of the others how many there are; exits with 3 where one failed."""
     drive_url, drive_profile = parse_url(url), load_profile(profile)
     chosen(rules)
     require_range("--reply-timeout", reply_timeout_s, 0.01, 60.0)
@@ -37,8 +45,9 @@ def conformance(
     if as_json:
         screen.emit(as_document(done))
     else:
-        _show_unenergised(done)
-        screen.out.print(f"[bold]{_counts(done)}[/]")
+        _show_unenergised(done, names_all=names_all)
+        untold = "" if names_all or not done.count(Outcome.NOT_TESTED) else "  [dim]--all names them[/]"
+        screen.out.print(f"[bold]{_counts(done)}[/]{untold}")
     if not done.conforms:
         raise SystemExit(SOME_FAILED)
 
@@ -105,8 +114,8 @@ def _is_unenergised(result: RuleResult) -> bool:
     return result.energises and result.outcome is Outcome.NOT_TESTED
 
 
-def _show_unenergised(done: Conformance) -> None:
-    """The rules that would have put a voltage on the motor, under the reason why none was put."""
+def _show_unenergised(done: Conformance, *, names_all: bool) -> None:
+    """How many rules would have put a voltage on the motor, under the reason why none was put; `names_all`: and which."""
     by_reason: dict[str, list[RuleResult]] = {}
     for result in filter(_is_unenergised, done.results):
         by_reason.setdefault(result.reason, []).append(result)
@@ -115,7 +124,8 @@ def _show_unenergised(done: Conformance) -> None:
             _show(results[0])
             continue
         screen.out.print(f"{MARKS[Outcome.NOT_TESTED]} {len(results)} rules not tested: {escape(reason)}")
-        screen.out.print(f"    [dim]{', '.join(result.name for result in results)}[/]")
+        if names_all:
+            screen.out.print(f"    [dim]{', '.join(result.name for result in results)}[/]")
 
 
 def _show(result: RuleResult) -> None:

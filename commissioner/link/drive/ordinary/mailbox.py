@@ -9,8 +9,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from commissioner.errors import ReplyMismatch, ReplyTimeout
-from commissioner.link.wire.port import LinkStats, Port, Words
+from commissioner.errors import ReplyTimeout
+from commissioner.link.wire.port import LinkStats, Port, Words, ask_again
 from commissioner.registers.mailbox import HEAD, UNDER_WAY, answered, not_yet, request
 from commissioner.registers.profile import DriveProfile, Item, Mailbox
 
@@ -52,16 +52,19 @@ class MailboxPort:
     def read_retries(self, retries: int) -> None:
         self._port.read_retries = retries
 
+    @property
+    def patience_s(self) -> float:
+        return self._port.patience_s
+
+    @patience_s.setter
+    def patience_s(self, seconds: float) -> None:
+        self._port.patience_s = seconds
+
     def read(self, address: int, count: int) -> Words:
         item = self._behind.get(address)
         if item is None:
             return self._port.read(address, count)
-        for _ in range(self.read_retries):
-            try:
-                return self._ask(item)
-            except (ReplyTimeout, ReplyMismatch):
-                continue
-        return self._ask(item)
+        return ask_again(lambda: self._ask(item), self.read_retries, self.patience_s, self._clock)
 
     def write(self, address: int, values: Sequence[int]) -> None:
         item = self._behind.get(address)

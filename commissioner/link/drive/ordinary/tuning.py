@@ -23,6 +23,7 @@ from commissioner.errors import (
 )
 from commissioner.link.drive.facts import Action, Intent, Journal
 from commissioner.link.drive.items import Items, number
+from commissioner.link.drive.ordinary.insisting import ATTEMPTS, is_lost
 from commissioner.link.drive.ordinary.unlocking import unlocked
 from commissioner.link.drive.reading import read_status
 from commissioner.registers.profile import DriveProfile
@@ -62,8 +63,8 @@ class Tuned:
 class _Awaited:
     """What one awaited item has shown so far; `before`: as it stood before the start, None where nothing was started."""
 
-    def __init__(self, step: Step, before: int | None, start_s: float) -> None:
-        self._step, self._before, self._start_s = step, before, start_s
+    def __init__(self, step: Step, before: int | None, start_s: float, lost: LinkError | None) -> None:
+        self._step, self._before, self._start_s, self._lost = step, before, start_s, lost
         self._has_begun = before is None
         self._first: int | None = None
 
@@ -82,10 +83,7 @@ class _Awaited:
             self._has_begun = True
         elif not self._has_begun and seen == self._before:
             if waited_s > BEGIN_S:
-                raise Aborted(
-                    "the drive did not begin to tune", step="tune: await", value=seen, limit=f"another status within {BEGIN_S:g} s",
-                    remedy="the start is not repeated: look at the drive, then tune again",
-                )  # fmt: skip
+                raise self._not_begun(seen)
         elif step.busy or seen != self._first:
             raise Aborted(
                 f"{step.item} is {seen}, which nobody listed: it was ended at the drive, or is another drive than its file says",
@@ -98,6 +96,18 @@ class _Awaited:
                 limit=f"one of {list(step.done)} within {step.within_s:g} s", remedy="look at the drive's display",
             )  # fmt: skip
         return False
+
+    def _not_begun(self, seen: int) -> CommissionerError:
+        """Of a start that nobody answered the link is what failed."""
+        if self._lost is None:
+            return Aborted(
+                "the drive did not begin to tune", step="tune: await", value=seen, limit=f"another status within {BEGIN_S:g} s",
+                remedy="the start is not repeated: look at the drive, then tune again",
+            )  # fmt: skip
+        return DriveFault(
+            "the drive did not answer the command to tune, and did not begin", step="tune: await", value=self._lost.value,
+            limit=self._lost.limit, remedy=f"the start is not repeated: look at the drive, then tune again; {self._lost.remedy}",
+        )  # fmt: skip
 
 
 class Tuner:
@@ -117,6 +127,8 @@ class Tuner:
         self._sleep, self._clock = sleep, clock
         self._before: int | None = None
         """The status that is awaited, as it stood before the start."""
+        self._lost: LinkError | None = None
+        """What took the start's answer."""
 
     @property
     def profile(self) -> DriveProfile:
@@ -174,10 +186,10 @@ class Tuner:
         item = self.profile.item(step.item)
         try:
             self._items.port.write(item.address, [step.value])
-        except (ReplyTimeout, ReplyMismatch):
+        except (ReplyTimeout, ReplyMismatch) as lost:
             if not step.once:
                 raise
-            # it may have arrived: what comes next is to look
+            self._lost = lost  # it may have arrived: what comes next is to look
 
     def _note_status_before(self, index: int) -> None:
         """How the status stands that will be awaited: by that a drive that did not begin is told from one that is done."""
@@ -193,8 +205,8 @@ class Tuner:
 
     def _await(self, step: Step) -> None:
         """Until the item is done. A value that stood there before the start means nothing until another was seen."""
-        watched = _Awaited(step, self._before, self._clock())
-        self._before, lost = None, 0
+        watched = _Awaited(step, self._before, self._clock(), self._lost)
+        self._before, self._lost, lost = None, None, 0
         while True:
             try:
                 seen = self._raw(step.item) & step.mask
@@ -239,21 +251,33 @@ class Tuner:
 
     # --- after ------------------------------------------------------------------------------------------------------
     def _end(self, error: BaseException | None) -> None:
-        """Every last step is tried, whatever came before and whichever of them fails."""
-        problems: list[CommissionerError] = []
+        """Every last step is tried, whatever came before and whichever of them fails; all of them again where an answer was lost: one
+        request that a broken connection took along must not leave the output on."""
         if error is not None and self._tuning.form == "assisted":
             self._operator.does("Stop the drive's tuning at the drive, if it still runs. Done?")
-        for step in self._tuning.finally_:
-            try:
-                self._end_step(step)
-            except CommissionerError as problem:
-                problems.append(problem)
+        problems = self._problems_of_end()
+        for _ in range(ATTEMPTS - 1):
+            if not any(map(is_lost, problems)):
+                break
+            problems = self._problems_of_end(is_first=False)
         if problems:
             first = problems[-1]
             raise DriveFault(
                 f"the drive does not confirm that it is at rest: {first.what}", step=REST, value=first.value,
                 limit=first.limit, remedy="take the motor as live: isolate the drive's supply, then look at its status",
             ) from error  # fmt: skip
+
+    def _problems_of_end(self, *, is_first: bool = True) -> list[CommissionerError]:
+        """What went wrong with the last steps; a write that is for once is not repeated."""
+        problems: list[CommissionerError] = []
+        for step in self._tuning.finally_:
+            if step.once and not is_first:
+                continue
+            try:
+                self._end_step(step)
+            except CommissionerError as problem:
+                problems.append(problem)
+        return problems
 
     def _end_step(self, step: Step) -> None:
         if step.do == "write":

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 
 from commissioner.errors import LinkError
+from commissioner.link.drive.ordinary.insisting import insist
 from commissioner.link.wire.port import Port
 from commissioner.registers.profile import DriveProfile
 
@@ -22,11 +24,16 @@ def unlocked(port: Port, profile: DriveProfile) -> Iterator[None]:
         yield
     except BaseException:
         with suppress(LinkError):
-            _put(port, profile.unlock.locks)
+            _lock(port, profile.unlock.locks)
         raise
-    _put(port, profile.unlock.locks)
+    _lock(port, profile.unlock.locks)
 
 
 def _put(port: Port, writes: Iterable[tuple[int, int]]) -> None:
     for address, value in writes:
         port.write(address, [value])
+
+
+def _lock(port: Port, writes: Iterable[tuple[int, int]]) -> None:
+    for one in writes:
+        insist(partial(_put, port, [one]))

@@ -1,0 +1,17 @@
+"""What the drive holds beside a run that was cut off after it had written: every archive reads its folders again."""
+
+from __future__ import annotations
+
+from alembic import op
+
+revision = "0003"
+down_revision = "0002"
+
+
+def upgrade() -> None:
+    """No folder's journal has this stamp; until then the row is told as it was."""
+    op.execute("UPDATE runs SET journal_bytes = -1")
+
+
+def downgrade() -> None:
+    """The words stay."""
