@@ -162,14 +162,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     windows: list[Window] = []
     remarks: list[str] = []
     standing_still: list[str] = []
-    named = [r.source for r in recordings if _is_named_speed(r)]
-    if named:
-        remarks.append(
-            f"{', '.join(named)}: the speed is one number all along, while the motor starts: a set point or a plate's, and not used."
-        )
-    has_speed = not named and all(
-        r.speed_rad_per_s is not None and np.isfinite(r.speed_rad_per_s).any() for r in recordings
-    )
+    has_speed, said_of_speed = _has_speed(recordings)
+    remarks += said_of_speed
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
     has_zero = not computed and all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
     sigmas, without = [], set("uvw") if computed else set[str]()
@@ -241,6 +235,17 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _has_speed(recordings: Sequence[RunningRecording]) -> tuple[bool, list[str]]:
+    """Whether all were measured with a speed, and what is said of one that is none."""
+    named = [r.source for r in recordings if _is_named_speed(r)]
+    if named:
+        return False, [
+            f"{', '.join(named)}: the speed is one number all along, while the motor starts: a set point or a plate's, and not used."
+        ]
+    speeds = [r.speed_rad_per_s for r in recordings]
+    return all(s is not None and np.isfinite(s).any() for s in speeds), []
 
 
 def _is_named_speed(one: RunningRecording) -> bool:

@@ -261,7 +261,7 @@ def _opposite(seen: OperatingPoint, said: OperatingPoint) -> str:
     """Power that flows the other way than this slip lets it: by more than the rated one, which no loss makes up for."""
     way = {True: "takes", False: "gives back"}
     return (
-        f"show {seen.power_w:.4g} W, where the plate's machine {way[said.power_w > 0.0]} {abs(said.power_w):.4g} W "
+        f"show {seen.power_w:.4g} W, where the plate's machine {way[said.power_w > seen.power_w]} {abs(said.power_w):.4g} W "
         "(a wrong scale makes channels look crossed)"
     )
 

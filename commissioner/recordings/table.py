@@ -340,14 +340,15 @@ def _without_still(table: Table, channels: Sequence[str]) -> Table:
     columns, notes, time = dict(table.columns), list(table.notes), table.columns["time_s"]
     for name, rows in stood_still(columns, here, is_current=channels == CURRENTS).items():
         value = f"{columns[name][rows][0]:.4g}"
-        said = f"{name} stands at {value} from {time[rows][0]:.3g} s on, {int(rows.sum())} rows in all, while the others move"
+        since, count = f"{time[rows][0]:.3g}", int(rows.sum())
         if rows.all() and (len(here) < len(channels) or name.removeprefix("voltage_") in {"u_v", "v_v", "w_v"}):
             raise _refuse(
-                table.source, f"{said}: it was not measured", value, "a channel that moves as the others do",
-                "look at its probe and its export, and record again",
+                table.source, f"{name} stands at {value} from {since} s on, {count} rows in all, while the others move: it was not measured", value,
+                "a channel that moves as the others do", "look at its probe and its export, and record again",
             )  # fmt: skip
         columns[name] = np.where(rows, np.nan, columns[name])
-        notes.append(ReadingNote("still_channel", f"{said}: not used there"))
+        what = f"{name} stands at {value} from {since} s on, {count} rows in all, while the others move: not used there"
+        notes.append(ReadingNote("still_channel", what))
     return replace(table, columns=columns, notes=tuple(notes))
 
 

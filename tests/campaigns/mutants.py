@@ -102,6 +102,7 @@ EXPLAINED = {
     ): ROUNDED,
     ("commissioner.motor.plate_match", "< ALIKE -> abs(math.log(current / factor)) <= ALIKE"): ROUNDED,
     ("commissioner.motor.plate_match", "> plate.rated_power_w -> abs(seen.power_w - said.power_w) >="): ROUNDED,
+    ("commissioner.motor.plate_match", "said.power_w > seen.power_w -> said.power_w >="): "their signs differ",
     ("commissioner.motor.plate_match", "factor > 1.0 -> factor >= 1.0"): "no usual factor is near 1",
 }
 """(module, part of the line with the mutant in it or of the mutant's name) of survivors, and why no test can kill them."""

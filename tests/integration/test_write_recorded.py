@@ -70,7 +70,9 @@ def held(drive):
     return 1e-4 * (high << 16 | low)
 
 
-def test_an_accepted_recording_is_written_in_the_drives_terms_and_restored_from_the_run(recording, drive, danfoss, tmp_path):
+def test_an_accepted_recording_is_written_in_the_drives_terms_and_restored_from_the_run(
+    recording, drive, danfoss, tmp_path
+):
     answer = write(recording, drive, tmp_path, danfoss)
     assert (answer.code, answer.json["outcome"]) == (0, "commissioned")
     found = answer.json["parameters"]["stator_resistance_ohm"]["value"]

@@ -294,6 +294,7 @@ def test_power_that_flows_the_other_way_than_the_slip_lets_it_is_said(way):
     assert found.likely is None and found.factor == pytest.approx(3.0)
     does = "takes" if way > 0.0 else "gives back"
     assert f"show {seen.power_w:.4g} W, where the plate's machine {does} {abs(said.power_w):.4g} W" in found.what
+    assert contradiction(replace(said, power_w=-way * 1e-4), PLATE) is not None
     idling = plate_point(PLATE, replace(RATED, slip=way * 0.01))
     for share in (0.999, 1.001):
         other = replace(idling, power_w=idling.power_w - way * share * PLATE.rated_power_w)
