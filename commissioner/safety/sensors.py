@@ -148,8 +148,8 @@ class SensorWatch:
 
 def _smallest_step(seen: Signal, known_a: float) -> float:
     """The smallest difference between two values of a phase, or the one known before; 0 while none has moved."""
-    steps = np.concatenate([np.diff(np.unique(phase)) for phase in seen])
-    least_a = float(np.min(steps, initial=known_a or math.inf))
+    steps = np.diff(np.sort(seen, axis=1), axis=1)
+    least_a = float(np.min(steps, initial=known_a or math.inf, where=steps > 0.0))
     return least_a if least_a < math.inf else 0.0
 
 

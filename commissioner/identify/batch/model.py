@@ -46,6 +46,11 @@ class ModelChoice:
         return SHARED + self.extra_powers + self.leg_size
 
     @property
+    def is_linear(self) -> bool:
+        """Nothing but the circuit: two modes will do, at a tenth of the time."""
+        return self.size == SHARED and not self.with_delay
+
+    @property
     def exponents(self) -> tuple[int, ...]:
         return IRON[self.extra_powers]
 
@@ -117,6 +122,8 @@ def stator_flux_of_current(theta: Matrix, model: ModelChoice, iron_wb: Signal, c
 
 def iron_flux(theta: Matrix, model: ModelChoice, stator_wb: float) -> float:
     """The inverse of `stator_flux`."""
+    if theta[SPLIT] == 0.0:
+        return stator_wb
     beyond = partial(_beyond, theta, model, stator_wb)
     return float(brentq(beyond, 0.0, stator_wb)) if beyond(stator_wb) > 0.0 else stator_wb
 

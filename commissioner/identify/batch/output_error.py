@@ -39,14 +39,18 @@ _SOLVED = 1e-12
 _MOST_STEPS = 40
 ROWS = 256
 """Weighted sensitivities gathered before they are multiplied."""
+WIDTH = 32
+"""Room for the numbers of one kind, one behind the other in one array: at constant distances the compiler sees that they are apart."""
+_S1, _S2, _SI, _DG, _DG_LAST, _PUSHED, _PUSHED_R, _TO_S1, _TO_S2, _TO_I, _TO_G, _WANTED = range(0, 12 * WIDTH, WIDTH)
 
 
 class Measured(NamedTuple):
-    """One segment (n,): voltage as commanded, V, and before its first sample; current, A; weight, 0 for samples that were lost; the
-    periods that are done in parts, for the current passes zero in them."""
+    """One segment (n,): voltage as commanded, V, and before its first sample; by how much it rises over each period, (0,) where it is
+    held; current, A; weight, 0 for samples that were lost; the periods that are done in parts, for the current passes zero in them."""
 
     u: Array
     u_before: float
+    rise: Array
     y: Array
     weight: Array
     passes_zero: NDArray[np.bool_]
@@ -268,6 +272,36 @@ def _add_rows(rows: Array, missed: Array, information: Array, score: Array, bloc
 
 
 @njit(inline="always")
+def _carry(
+    m: Array,
+    width: int,
+    response: tuple[float, float, float, float, float, float],
+    by_rotor: tuple[float, float],
+    resistance: tuple[float, float],
+    ahead: float,
+    by_i: tuple[float, float, float],
+    to_current: tuple[float, float],
+    to_iron: tuple[float, float],
+) -> None:
+    """Every sensitivity in `m` over one step. `response`: Ad and b1; of a voltage on the rotor; what g takes off both voltages per ampere;
+    dw/di0, dw/di's share in 1 / (1 + ...) and dw/di; current and iron's extra one by the fluxes."""
+    a11, a12, a21, a22, b11, b12 = response
+    (by_i0, scale, by_i1), (h_g, h_gr), (g_s, g_r) = by_i, to_current, to_iron
+    back1, back2 = b11 * by_i1, b12 * by_i1
+    for j in range(width):
+        dg = m[_DG + j]
+        extra = dg + ahead * (dg - m[_DG_LAST + j])
+        push = m[_PUSHED + j] - resistance[0] * extra - by_i0 * m[_SI + j]
+        push_r = m[_PUSHED_R + j] - resistance[1] * extra
+        d1 = a11 * m[_S1 + j] + a12 * m[_S2 + j] + b11 * push + by_rotor[0] * push_r + m[_TO_S1 + j]
+        d2 = a21 * m[_S1 + j] + a22 * m[_S2 + j] + b12 * push + by_rotor[1] * push_r + m[_TO_S2 + j]
+        si = (h_g * d1 + h_gr * d2 + m[_TO_I + j]) * (scale * m[_WANTED + j])
+        s1, s2 = d1 - back1 * si, d2 - back2 * si
+        m[_SI + j], m[_S1 + j], m[_S2 + j], m[_DG_LAST + j] = si, s1, s2, dg
+        m[_DG + j] = g_s * s1 + g_r * s2 + m[_TO_G + j]
+
+
+@njit(inline="always")
 def _add_directly(
     x1: float,
     x2: float,
@@ -325,11 +359,11 @@ def simulate(
     furthest, loss = np.max(np.abs(table)), Loss(table, integral, per_a)
 
     x1, x2 = own[1], own[2]
-    s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
-    dg, dg_last, push, push_r, d1, d2 = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
-    pushed, to_s1, to_s2, to_i, to_g = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
+    m, width = np.zeros(12 * WIDTH), (p + 3) // 4 * 4  # d(psi_s, psi_R, i), and what they are carried on with
+    m[_S1 + first_own + 1], m[_S2 + first_own + 2], m[_WANTED : _WANTED + p] = 1.0, 1.0, wanted
+    s1, s2, si, dg, pushed = m[_S1:_S2], m[_S2:_SI], m[_SI:_DG], m[_DG:_DG_LAST], m[_PUSHED:_PUSHED_R]
+    to_s1, to_s2, to_i, to_g = m[_TO_S1:_TO_S2], m[_TO_S2:_TO_I], m[_TO_I:_TO_G], m[_TO_G:_WANTED]
     power = np.zeros(extra_powers + 1)
-    s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
     x_iron = on_stator * x1 + on_rotor * x2
     g, slope_g = _extra(machine, x_iron, power)
     g_last = g
@@ -338,9 +372,9 @@ def simulate(
     for j in range(p):
         dg[j] = slope_g * (on_stator * s1[j] + on_rotor * s2[j]) + to_g[j]
         si[j] = h_s * s1[j] + h_r * s2[j] + on_stator * (dg[j] - to_g[j]) + to_i[j]
-    dg_last[:] = dg
+    m[_DG_LAST:_PUSHED] = dg
     missed, begun, keeps = np.zeros(ROWS), 0, rows.shape[0] == u.size
-    total, v_last, last_parts = 0.0, measured.u_before, 1
+    total, v_last, last_parts, rise = 0.0, measured.u_before, 1, 0.0
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
@@ -359,8 +393,10 @@ def simulate(
                 begun = k + 1
         if k == u.size - 1:
             break
-        jump = u[k] - v_last
-        v_last = u[k]
+        if measured.rise.size > 0:
+            rise = measured.rise[k]
+        jump = u[k] + 0.5 * rise - v_last
+        v_last = u[k] + 0.5 * rise
         parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
         beta = h_s * b1[h, 0] + h_r * b1[h, 1]
         a11, a12, a21, a22, b11, b12 = ad[h, 0, 0], ad[h, 0, 1], ad[h, 1, 0], ad[h, 1, 1], b1[h, 0], b1[h, 1]
@@ -372,7 +408,8 @@ def simulate(
             ahead = 0.5 * last_parts / parts
             last_parts = parts
             extra = g + ahead * (g - g_last)
-            held = u[k] - late * jump - 0.5 * tilt - r_s * on_stator * extra
+            tilt += rise / parts
+            held = u[k] + rise * ((part + 0.5) / parts - 0.5) - late * jump - 0.5 * tilt - r_s * on_stator * extra
             c1 = a11 * x1 + a12 * x2 + b11 * held + b2[h, 0] * tilt
             c2 = a21 * x1 + a22 * x2 + b12 * held + b2[h, 1] * tilt
             held_r = -r_r * on_rotor * extra
@@ -418,36 +455,24 @@ def simulate(
             _add_directly(x1, x2, l_l, l_0, on_stator, g, slope_g, power, to_i, to_g)
             scale = 1.0 / (1.0 + (beta + on_stator * slope_g * b_iron) * by_i1)
             h_g, h_gr = h_s + on_stator * on_stator * slope_g, h_r + on_stator * on_rotor * slope_g
-            back1, back2 = b11 * by_i1, b12 * by_i1
-            # One array is written by each loop: of more, the compiler does not see that they are apart, and takes one by one.
-            for j in range(p):
-                push[j] = pushed[j] - r_s * on_stator * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+            by_rotor = 0.0, 0.0
             if is_split:
-                for j in range(p):
-                    push_r[j] = -r_r * on_rotor * (dg[j] + ahead * (dg[j] - dg_last[j]))
-                push_r[1] -= on_rotor * extra
-                push_r[SPLIT] -= r_r * extra
+                by_rotor = b_r[h, 0], b_r[h, 1]
+                m[_PUSHED_R + 1], m[_PUSHED_R + SPLIT] = -on_rotor * extra, -r_r * extra
                 for j in range(CIRCUIT):
                     to_s1[j] += db_r[h, j, 0] * held_r
                     to_s2[j] += db_r[h, j, 1] * held_r
-            dg, dg_last = dg_last, dg
-            for j in range(p):
-                d1[j] = a11 * s1[j] + a12 * s2[j] + b11 * push[j] + to_s1[j]
-            for j in range(p):
-                d2[j] = a21 * s1[j] + a22 * s2[j] + b12 * push[j] + to_s2[j]
-            if is_split:
-                for j in range(p):
-                    d1[j] += b_r[h, 0] * push_r[j]
-                for j in range(p):
-                    d2[j] += b_r[h, 1] * push_r[j]
-            for j in range(p):
-                si[j] = (h_g * d1[j] + h_gr * d2[j] + to_i[j]) * (scale * wanted[j])
-            for j in range(p):
-                s1[j] = d1[j] - back1 * si[j]
-            for j in range(p):
-                s2[j] = d2[j] - back2 * si[j]
-            for j in range(p):
-                dg[j] = slope_g * (on_stator * s1[j] + on_rotor * s2[j]) + to_g[j]
+            _carry(
+                m,
+                width,
+                (a11, a12, a21, a22, b11, b12),
+                by_rotor,
+                (r_s * on_stator, r_r * on_rotor),
+                ahead,
+                (by_i0, scale, by_i1),
+                (h_g, h_gr),
+                (slope_g * on_stator, slope_g * on_rotor),
+            )
     return total
 
 

@@ -68,10 +68,11 @@ class Amplitude:
         if self.least_impedance is None or math.isinf(trip_a):
             return self.first
         step_s = STRIDE * self.sample_period_s
-        peaks = self.forecast.ahead(
-            self.least_impedance, np.arange(step_s, self.forecast.excitation.duration_s, step_s), loss=SURE_LOSS
-        )
-        return _largest(0.0, self.first, lambda scale: peaks(scale)[1] < 0.5 * (self.current_a + trip_a))
+        is_permitted = self.forecast.keeps_below(
+            (math.inf, 0.5 * (self.current_a + trip_a)), self.least_impedance,
+            np.arange(step_s, self.forecast.excitation.duration_s, step_s), loss=SURE_LOSS,
+        )  # fmt: skip
+        return _largest(0.0, self.first, is_permitted)
 
     def _below(self, voltage_v: float) -> float:
         """The scale at which no peak of the command passes this voltage; 1 at the most."""
@@ -95,14 +96,9 @@ class Amplitude:
         step_s = STRIDE * self.sample_period_s
         time_s = np.arange(step_s, self.forecast.excitation.duration_s, step_s)
         ramp = np.minimum(time_s * ramp_per_s, 1.0)
-
-        peaks = self.forecast.ahead(worst, began_s + time_s, loss=SURE_LOSS)
-
-        def is_permitted(scale: float) -> bool:
-            flux_wb, current_a = peaks(np.minimum(ramp, scale))
-            return flux_wb < KNOWN_TARGET * self.limit_wb and current_a < self.current_a
-
-        return _largest(self.safe, 1.0, is_permitted)
+        most = KNOWN_TARGET * self.limit_wb, self.current_a
+        is_permitted = self.forecast.keeps_below(most, worst, began_s + time_s, loss=SURE_LOSS)
+        return _largest(self.safe, 1.0, lambda scale: is_permitted(np.minimum(ramp, scale)))
 
     def by_flux(self, worst: InverseGamma) -> float:
         """What keeps the machine's flux within `TARGET` of the limit whatever the phases: sum over tones of its flux
@@ -127,9 +123,7 @@ class Amplitude:
         ahead = time_s + np.arange(0.0, ahead_s, step_s)
         start = (float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1]), 0.0)
         most_a = min(self.current_a, max(GROWTH * seen_a, CURRENT_STEP * self.current_a))
-
-        peaks = self.forecast.ahead(worst, ahead, start, KNOWN_LOSS)
-        return _largest(scale, wanted, lambda tried: peaks(tried)[1] < most_a)
+        return _largest(scale, wanted, self.forecast.keeps_below((math.inf, most_a), worst, ahead, start, KNOWN_LOSS))
 
     def unsure(self, machine: InverseGamma, scale: float) -> float:
         """A small raise: it adds at most `CURRENT_STEP` of the permitted current, all tones at their peaks at once."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -44,14 +45,32 @@ class Forecast:
     ) -> tuple[float, float]:
         """(largest |stator flux|, largest |current|) over evenly spaced instants, from (current, rotor flux, integrated
         stator flux), this share of the inverter's loss taken off."""
-        return self.ahead(machine, time_s, start, loss)(scale)
+        return self._ahead(machine, time_s, start, loss, (math.inf, math.inf))(scale)
 
-    def ahead(
+    def keeps_below(
         self,
+        most: tuple[float, float],
         machine: InverseGamma,
         time_s: Signal,
         start: tuple[float, float, float] = (0.0, 0.0, 0.0),
         loss: float = 1.0,
+    ) -> Callable[[float | Signal], bool]:
+        """Whether both `peaks` stay below the most, over the scale; what does not is simulated no further than to there."""
+        peaks = self._ahead(machine, time_s, start, loss, most)
+
+        def keeps(scale: float | Signal) -> bool:
+            flux_wb, current_a = peaks(scale)
+            return flux_wb < most[0] and current_a < most[1]
+
+        return keeps
+
+    def _ahead(
+        self,
+        machine: InverseGamma,
+        time_s: Signal,
+        start: tuple[float, float, float],
+        loss: float,
+        most: tuple[float, float],
     ) -> Callable[[float | Signal], tuple[float, float]]:
         """`peaks` over the scale: what is the same for all scales is computed once."""
         period_s = float(time_s[1] - time_s[0])
@@ -61,7 +80,7 @@ class Forecast:
         held = Held(matrix, gain, r_s, leakage, lost_v, self.span_a)
 
         def peaks(scale: float | Signal) -> tuple[float, float]:
-            flux_wb, current_a = forecast(of_scale(scale), period_s, held, *start)
+            flux_wb, current_a = forecast(of_scale(scale), period_s, held, start, most)
             return float(flux_wb), float(current_a)
 
         return peaks

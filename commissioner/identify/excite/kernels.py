@@ -10,16 +10,25 @@ from numpy.typing import NDArray
 from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
+TURNS = 64
+"""Of a tone, each of which adds a rounding error to it."""
 
 
 @njit()
 def sum_of_tones(time_s: Array, tones: Array) -> Array:
-    """At the instants `(n,)`; `tones` `(m, 3)`: amplitude, frequency in Hz, phase in rad."""
+    """At evenly spaced instants `(n,)`; `tones` `(m, 3)`: amplitude, frequency in Hz, phase in rad. A tone is turned from instant to
+    instant, and laid down anew after `TURNS`."""
     total = np.zeros_like(time_s)
+    step_s = (time_s[-1] - time_s[0]) / (time_s.size - 1) if time_s.size > 1 else 0.0
     for m in range(tones.shape[0]):
         amplitude, omega, phase = tones[m, 0], 2.0 * math.pi * tones[m, 1], tones[m, 2]
-        for k in range(time_s.size):
-            total[k] += amplitude * math.cos(omega * time_s[k] + phase)
+        turn_cos, turn_sin = math.cos(omega * step_s), math.sin(omega * step_s)
+        for first in range(0, time_s.size, TURNS):
+            angle = omega * time_s[first] + phase
+            x, y = amplitude * math.cos(angle), amplitude * math.sin(angle)
+            for k in range(first, min(first + TURNS, time_s.size)):
+                total[k] += x
+                x, y = turn_cos * x - turn_sin * y, turn_sin * x + turn_cos * y
     return total
 
 

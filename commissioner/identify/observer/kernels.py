@@ -197,14 +197,18 @@ def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[fl
 
 
 @njit()
-def forecast(u: Array, period: float, held: Held, i: float, psi_r: float, free: float) -> tuple[float, float]:
+def forecast(
+    u: Array, period: float, held: Held, start: tuple[float, float, float], most: tuple[float, float]
+) -> tuple[float, float]:
     """(largest |stator flux|, largest |current|) under the voltages u, `(n,)`, held for `period` each: of the linear
-    machine from (i, psi_R); the flux also of `free`, which integrates u - F(i) - R_s i.
+    machine from `start`, (i, psi_R, free); the flux also of `free`, which integrates u - F(i) - R_s i. It ends where either is no
+    longer below the `most`.
 
     F is taken at the end of each period: i' + g F(i') = i' without loss.
     """
     matrix, gain, r_s, leakage = held.matrix, held.gain, held.r_s, held.leakage
     lost_v, lost_span = held.lost_v, held.lost_span
+    i, psi_r, free = start
     top, top_a = abs(free), abs(i)
     for k in range(u.size):
         known = matrix[0, 0] * i + matrix[0, 1] * psi_r + gain[0] * u[k]
@@ -213,6 +217,8 @@ def forecast(u: Array, period: float, held: Held, i: float, psi_r: float, free: 
         psi_r = matrix[1, 0] * i + matrix[1, 1] * psi_r + gain[1] * (u[k] - loss)
         i = known - gain[0] * loss
         top, top_a = max(top, abs(psi_r + leakage * i), abs(free)), max(top_a, abs(i))
+        if top >= most[0] or top_a >= most[1]:
+            break
     return top, top_a
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import Segment
-from commissioner.identify.excite.tones import ExcitationLimits, design, predicted_peaks
+from commissioner.identify.excite.tones import Excitation, ExcitationLimits, Tone, design, predicted_peaks
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import rated_flux
 from tests.support.standstill import linear_response, multitone, usable_motors
@@ -111,3 +111,12 @@ def test_a_quarter_of_the_time_has_twice_the_standard_errors_and_nothing_is_gain
     assert cut.seconds == 1.0
     assert cut.relative_std == pytest.approx([2.0 * std for std in chosen.relative_std])
     assert chosen.cut_to(4.5) == chosen
+
+
+def test_a_tone_that_is_turned_is_its_cosine():
+    time = 3.7 + np.arange(1000) * PERIOD_S
+    tones = Excitation((Tone(30.0, 0.7, 0.3), Tone(20.0, 173.4, -1.0)), 1.5, 5.0)
+    exact = 30.0 * np.cos(2.0 * np.pi * 0.7 * time + 0.3) + 20.0 * np.cos(2.0 * np.pi * 173.4 * time - 1.0)
+    assert tones.voltage_v(time, 0.5) == pytest.approx(1.5 + 0.5 * exact, abs=1e-10)
+    assert tones.voltage_v(time[:1]) == pytest.approx(1.5 + exact[:1], abs=1e-10)
+    assert tones.voltage_v(time[:0]).size == 0
