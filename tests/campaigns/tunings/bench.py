@@ -44,7 +44,7 @@ class VendorPort:
 
     def __init__(self, drive: VendorDrive, clock: JumpingClock, lost_after: int | None = None) -> None:
         self.stats = LinkStats()
-        self.read_retries = 0
+        self.read_retries, self.patience_s = 0, 0.0
         self.reply_timeout_s = 0.5
         self._drive, self._clock, self._lost_after = drive, clock, lost_after
 
