@@ -15,7 +15,7 @@ from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.foresight import Foresight
 from commissioner.identify.batch.model import CIRCUIT, IRON, Matrix, ModelChoice, start_theta
 from commissioner.identify.batch.problem import Problem
-from commissioner.identify.batch.segments import THINNING, BatchFit, Segment, extended, thinned
+from commissioner.identify.batch.segments import BatchFit, Segment, extended
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.staircase import InverterError, knee_shape
 from commissioner.motor.circuit import InverseGamma
@@ -73,7 +73,7 @@ def _begun(
         begun, others = _those_simulated(attempts), list(starts)
     else:
         model = ModelChoice(leg=law, with_drift=False)
-        problem = Problem(*thinned(segments, period_s), model, is_coarse=True)
+        problem = Problem(segments, period_s, model, is_coarse=True)
         squares = [problem.squares(start_theta(start, model, leg)) for start in starts]
         ranked = [starts[k] for k in np.argsort(squares)]
         begun, others = [], ranked
@@ -154,30 +154,16 @@ def _from_other_starts(
     segments: Sequence[Segment], period_s: float, starts: Sequence[InverseGamma], best: BatchFit
 ) -> BatchFit:
     """The chosen model once more from the other machines, until they come to the same minimum: a way through simpler
-    models may have led into a wrong one. Those that do so on the thinned record need not on the whole."""
-    few = (segments, period_s) if best.model.is_linear else thinned(segments, period_s)
-    theta = {start: _moved(best, start) for start in starts}
-    is_whole = not starts or few[1] == period_s
-    here = best if is_whole else _coarse(*few, starts[0], best.model, best.theta, best.own)
-    attempts = [
-        partial(_coarse, segments, period_s, start, best.model, theta[start], known=best.sum_of_squares)
-        for start in starts
-        if _is_lower(partial(_coarse, *few, start, best.model, theta[start], known=here.sum_of_squares), here)
-    ]
+    models may have led into a wrong one."""
+    attempts = []
+    for start in starts:
+        theta = best.theta.copy()
+        theta[:CIRCUIT] = start_theta(start, best.model)[:CIRCUIT]
+        attempts.append(partial(_coarse, segments, period_s, start, best.model, theta, known=best.sum_of_squares))
     finalists = [best, *_those_simulated(attempts)]
     chosen = min(finalists, key=lambda f: f.criterion())
     gamma = chosen.gamma.as_inverse_gamma()
     return fit_segments(segments, period_s, gamma, chosen.model, chosen.theta, FINAL_STEPS, own_start=chosen.own)
-
-
-def _moved(fit: BatchFit, start: InverseGamma) -> Matrix:
-    """Its values with another machine's circuit."""
-    return np.concatenate([start_theta(start, fit.model)[:CIRCUIT], fit.theta[CIRCUIT:]])
-
-
-def _is_lower(attempt: Callable[[], BatchFit], here: BatchFit) -> bool:
-    """Whether a fit of the thinned record ends in another, lower minimum; of the criterion it shows a fraction."""
-    return any(f.criterion() < here.criterion() - BETTER / THINNING for f in _those_simulated([attempt]))
 
 
 def _those_simulated(attempts: Sequence[Callable[[], BatchFit]]) -> list[BatchFit]:
@@ -193,12 +179,7 @@ def _begin(
     segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None, law: LegLaw
 ) -> BatchFit:
     model = ModelChoice(leg=law if leg else None, with_drift=False)
-    theta, own = start_theta(start, model, leg), None
-    few, longer_s = thinned(segments, period_s)
-    if longer_s > period_s and not model.is_linear:
-        for near in _those_simulated([partial(_coarse, few, longer_s, start, model, theta)]):
-            theta, own = near.theta, near.own
-    return _coarse(segments, period_s, start, model, theta, own)
+    return _coarse(segments, period_s, start, model, start_theta(start, model, leg))
 
 
 def _coarse(

@@ -45,12 +45,11 @@ _S1, _S2, _SI, _DG, _DG_LAST, _PUSHED, _PUSHED_R, _TO_S1, _TO_S2, _TO_I, _TO_G, 
 
 
 class Measured(NamedTuple):
-    """One segment (n,): voltage as commanded, V, and before its first sample; by how much it rises over each period, (0,) where it is
-    held; current, A; weight, 0 for samples that were lost; the periods that are done in parts, for the current passes zero in them."""
+    """One segment (n,): voltage as commanded, V, and before its first sample; current, A; weight, 0 for samples that were lost; the
+    periods that are done in parts, for the current passes zero in them."""
 
     u: Array
     u_before: float
-    rise: Array
     y: Array
     weight: Array
     passes_zero: NDArray[np.bool_]
@@ -374,7 +373,7 @@ def simulate(
         si[j] = h_s * s1[j] + h_r * s2[j] + on_stator * (dg[j] - to_g[j]) + to_i[j]
     m[_DG_LAST:_PUSHED] = dg
     missed, begun, keeps = np.zeros(ROWS), 0, rows.shape[0] == u.size
-    total, v_last, last_parts, rise = 0.0, measured.u_before, 1, 0.0
+    total, v_last, last_parts = 0.0, measured.u_before, 1
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
@@ -393,10 +392,8 @@ def simulate(
                 begun = k + 1
         if k == u.size - 1:
             break
-        if measured.rise.size > 0:
-            rise = measured.rise[k]
-        jump = u[k] + 0.5 * rise - v_last
-        v_last = u[k] + 0.5 * rise
+        jump = u[k] - v_last
+        v_last = u[k]
         parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
         beta = h_s * b1[h, 0] + h_r * b1[h, 1]
         a11, a12, a21, a22, b11, b12 = ad[h, 0, 0], ad[h, 0, 1], ad[h, 1, 0], ad[h, 1, 1], b1[h, 0], b1[h, 1]
@@ -408,8 +405,7 @@ def simulate(
             ahead = 0.5 * last_parts / parts
             last_parts = parts
             extra = g + ahead * (g - g_last)
-            tilt += rise / parts
-            held = u[k] + rise * ((part + 0.5) / parts - 0.5) - late * jump - 0.5 * tilt - r_s * on_stator * extra
+            held = u[k] - late * jump - 0.5 * tilt - r_s * on_stator * extra
             c1 = a11 * x1 + a12 * x2 + b11 * held + b2[h, 0] * tilt
             c2 = a21 * x1 + a22 * x2 + b12 * held + b2[h, 1] * tilt
             held_r = -r_r * on_rotor * extra

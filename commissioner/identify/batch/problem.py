@@ -60,7 +60,6 @@ class Problem:
         self.bounds = (np.zeros(CIRCUIT), np.full(CIRCUIT, np.inf))
         self.period_s = period_s
         self.model = model
-        self.is_held = all(s.rise_v is None for s in segments)
         self.plateau_v = 1.0
         shared, count = model.size, len(segments)
         assert shared + OWN <= output_error.WIDTH, "of more numbers the compiled pass has no room"
@@ -71,7 +70,7 @@ class Problem:
         near = NEAR_ZERO_WHEN_LATE if model.with_delay and not is_coarse else NEAR_ZERO
         self.passes_zero = [self._passes_zero(s.current_a, near) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
-        self.noise_a2 = float(np.median([s.noise_a2 for s in segments]))
+        self.noise_a2 = float(np.median([np.var(np.diff(s.measured(s.current_a), 2)) for s in segments])) / 6.0
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
         self.columns = [np.concatenate([np.arange(shared), shared + OWN * k + np.arange(OWN)]) for k in range(count)]
         self.total = shared + OWN * count
@@ -141,7 +140,7 @@ class Problem:
     ) -> Evaluation:
         """All segments simulated; the signals of `over`, which is not needed any more, are written over. With the sensitivities of
         `near`, where they are kept: under half the time. `is_general`: with sensitivities also where two modes would do."""
-        is_linear = self.model.is_linear and self.is_held and theta[DELAY] == 0.0 and not is_general
+        is_linear = self.model.is_linear and theta[DELAY] == 0.0 and not is_general
         is_near = near is not None and self.knows(near)
         held = None if is_linear else self._held(theta[:CIRCUIT], is_linearised=not is_near)
         information = near.information if near is not None and is_near else np.zeros((self.total, self.total))
@@ -223,9 +222,8 @@ class Problem:
         wanted = self.free[self.columns[k]].astype(np.float64)
         _, score, block, scores, residual, _ = shared
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
-        rise_v = np.zeros(0) if segment.rise_v is None else segment.rise_v
         squares = output_error.simulate(
-            Measured(segment.voltage_v, before, rise_v, segment.current_a, self.weights[k], self.passes_zero[k]),
+            Measured(segment.voltage_v, before, segment.current_a, self.weights[k], self.passes_zero[k]),
             held,
             Machine(theta, np.array(model.exponents, dtype=np.int64), model.flux_scale_wb),
             Shapes(self.bases[k], self.integrals[k], self.current_span_a),

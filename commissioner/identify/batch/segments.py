@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,8 +32,7 @@ PRICE = 4.0
 @dataclass(frozen=True)
 class Segment:
     """One uninterrupted stretch: voltage along the axis held over each period, current along it at the period's
-    start. `weight`: 0 where the current was not measured, 1 elsewhere; None: all was. `rise_v`: by how much the voltage rises over
-    each period; None: it is held. `known_noise_a2` where it does not show from sample to sample."""
+    start. `weight`: 0 where the current was not measured, 1 elsewhere; None: all was."""
 
     voltage_v: Signal
     current_a: Signal
@@ -42,50 +40,10 @@ class Segment:
     starts_at_rest: bool
     kind: str = "multitone"
     weight: Signal | None = None
-    rise_v: Signal | None = None
-    known_noise_a2: float | None = None
-
-    @property
-    def noise_a2(self) -> float:
-        """The current's noise, squared, by its second differences."""
-        if self.known_noise_a2 is not None:
-            return self.known_noise_a2
-        return float(np.var(np.diff(self.measured(self.current_a), 2))) / 6.0
 
     def measured(self, signal: Signal) -> Signal:
         """The signal where the current was measured."""
         return signal if self.weight is None else signal[self.weight > 0.0]
-
-
-THINNING = 4
-FEWEST_THINNED = 1000
-"""Samples of a thinned record: with less there is nothing to be saved."""
-
-
-def thinned(segments: Sequence[Segment], period_s: float) -> tuple[Sequence[Segment], float]:
-    """A record to begin with: every fourth current, as if it were four, and of the voltage between them the mean and the first moment,
-    of which the current behind an inductance knows no more to the third order. As it is where currents are missing or few.
-    """
-    if (
-        any(s.weight is not None for s in segments)
-        or sum(s.current_a.size for s in segments) < THINNING * FEWEST_THINNED
-    ):
-        return segments, period_s
-    return [_thinned(s) for s in segments], THINNING * period_s
-
-
-def _thinned(segment: Segment) -> Segment:
-    size = segment.voltage_v.size // THINNING
-    voltage_v = segment.voltage_v[: THINNING * size].reshape(size, THINNING)
-    arm = np.arange(THINNING) - 0.5 * (THINNING - 1)
-    return replace(
-        segment,
-        voltage_v=voltage_v.mean(axis=1),
-        current_a=segment.current_a[: THINNING * size : THINNING].copy(),
-        weight=np.full(size, float(THINNING)),
-        rise_v=voltage_v @ arm * (12.0 / THINNING**2),
-        known_noise_a2=segment.noise_a2,
-    )
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.identify.batch import extensions
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.foresight import Foresight
 from commissioner.identify.batch.model import DELAY, IRON, OWN, SHARED, SPLIT, ModelChoice, start_theta
 from commissioner.identify.batch.output_error import WIDTH
 from commissioner.identify.batch.problem import Problem
-from commissioner.identify.batch.segments import THINNING, Segment, thinned
+from commissioner.identify.batch.segments import Segment
 from commissioner.identify.batch.whiteness import whiteness
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.staircase import knee_shape
@@ -142,38 +141,6 @@ def test_the_linear_machine_is_the_general_one_without_extensions():
 
 def test_the_compiled_pass_has_room_for_the_largest_model():
     assert ModelChoice(max(IRON), leg=LegLaw(1.0)).size + OWN <= WIDTH
-
-
-def test_a_thinned_record_says_what_the_whole_one_says():
-    """Without noise, tones up to 100 Hz held for 200 us: of the mean voltage alone R_R was 0.6 % off."""
-    voltage = multitone([*TONES, (20.0, 100.3, 1.0)], 6.0, PERIOD_S)
-    current = linear_response(TRUTH, voltage, PERIOD_S)[0]
-    few, period_s = thinned([Segment(voltage, current, 0.0, True)], PERIOD_S)
-    assert (period_s, few[0].current_a.size) == (THINNING * PERIOD_S, voltage.size // THINNING)
-    assert np.max(np.abs(relative(fit_segments(few, period_s, START)))) < 2e-5
-
-
-def test_a_record_of_few_samples_or_with_lost_ones_is_not_thinned():
-    short = Segment(np.zeros(600), np.zeros(600), 0.0, True)
-    lost = Segment(np.zeros(9000), np.zeros(9000), 0.0, True, weight=np.ones(9000))
-    assert thinned([short], PERIOD_S) == ([short], PERIOD_S)
-    assert thinned([lost], PERIOD_S) == ([lost], PERIOD_S)
-
-
-def test_the_whole_record_is_fitted_only_from_where_another_fit_ended(monkeypatch):
-    """Machines to begin with, and whether they come to one minimum, are tried on the thinned one."""
-    begun_from_nothing = []
-
-    def fitted(parts, period_s, *given, **options):
-        own = options.get("own_start", given[5] if len(given) > 5 else None)
-        begun_from_nothing.append((period_s, own is None))
-        return fit_segments(parts, period_s, *given, **options)
-
-    monkeypatch.setattr(extensions, "fit_segments", fitted)
-    segments, _ = behind_legs()
-    select_model(segments, PERIOD_S, [START, InverseGamma(*TRUTH)], knee_shape(4.0, 0.1, 2.0))
-    assert (THINNING * PERIOD_S, True) in begun_from_nothing
-    assert (PERIOD_S, True) not in begun_from_nothing
 
 
 def behind_legs():
