@@ -4,6 +4,7 @@ under xdist only: which tests stay together on one, and that the costliest begin
 import gc
 import json
 import os
+import re
 import tempfile
 from collections import defaultdict
 from functools import cache
@@ -68,6 +69,8 @@ NIGHT = TESTS.parent / ".ci" / "night.txt"
 """Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
 """Seconds of the tests that take one or more, as `tests/support/suite/durations.py` writes them."""
+_GROUP = re.compile(r"@[\w/]+\.py$")
+"""A group is called after its file."""
 USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 """What a test is taken to cost that the table does not name; those of `hidden_effects` are whole diagnoses."""
 
@@ -88,6 +91,14 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 @cache
 def _is_in(names: tuple[str, ...], path: Path) -> bool:
     return any(path.is_relative_to(TESTS / name) for name in names)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """To whoever gave the tests out a test has its own name again: by the one that xdist gives it (`name@group`) `--lf` knew no test that had
+    failed, and judged all of them once more, one by one."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        report.nodeid = _GROUP.sub("", report.nodeid)
 
 
 def pytest_collection_finish() -> None:

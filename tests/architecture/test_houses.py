@@ -2,6 +2,8 @@
 
 import ast
 import pathlib
+import subprocess
+import sys
 from collections import Counter
 
 import pytest
@@ -57,3 +59,24 @@ def test_top_level_holds_nothing_but_the_house():
     }
     seen = {path.name for path in ROOT.iterdir() if not path.name.startswith(".")}
     assert seen <= allowed
+
+
+def test_what_was_late_alone_is_judged_once_more(tmp_path):
+    """As `.ci/run` does it: of tests whose group has a name of its own, too. For a while all were, one after the other: ten minutes."""
+    (tmp_path / "conftest.py").write_text("from tests.conftest import pytest_runtest_logreport\n", "utf-8")
+    (tmp_path / "test_late.py").write_text(
+        "import pytest\n@pytest.mark.xdist_group('sim/test_late.py')\n"
+        "@pytest.mark.parametrize('late', [True, False])\ndef test(late):\n    assert not late\n",
+        "utf-8",
+    )
+    command = [
+        sys.executable, "-m", "pytest", "-c", str(ROOT / "pyproject.toml"), "--rootdir", str(tmp_path), "-o", f"cache_dir={tmp_path / 'kept'}",
+        str(tmp_path),
+    ]  # fmt: skip
+    said = [
+        subprocess.run(
+            [*command, *more], capture_output=True, text=True, encoding="utf-8", check=False, cwd=ROOT
+        ).stdout
+        for more in (["-n", "1", "--dist", "loadgroup"], ["--lf", "--lfnf=none"])
+    ]
+    assert "1 failed, 1 passed" in said[0] and "1 failed" in said[1] and "passed" not in said[1], said
