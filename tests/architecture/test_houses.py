@@ -1,6 +1,7 @@
 """The house holds: import directions (the contracts of pyproject.toml), sizes of its rooms, what lies at the top."""
 
 import ast
+import os
 import pathlib
 import subprocess
 import sys
