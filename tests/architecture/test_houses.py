@@ -74,9 +74,10 @@ def test_what_was_late_alone_is_judged_once_more(tmp_path):
         sys.executable, "-m", "pytest", "-c", str(ROOT / "pyproject.toml"), "--rootdir", str(tmp_path), "-o", f"cache_dir={tmp_path / 'kept'}",
         str(tmp_path),
     ]  # fmt: skip
+    alone = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
     said = [
         subprocess.run(
-            [*command, *more], capture_output=True, text=True, encoding="utf-8", check=False, cwd=ROOT
+            [*command, *more], capture_output=True, text=True, encoding="utf-8", check=False, cwd=ROOT, env=alone
         ).stdout
         for more in (["-n", "1", "--dist", "loadgroup"], ["--lf", "--lfnf=none"])
     ]
