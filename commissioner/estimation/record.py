@@ -11,6 +11,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.channels import check_sums, without_spikes
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
 from commissioner.motor.computed import is_negative_sum
@@ -160,7 +161,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     scales = scales_of(plate)
     period = recordings[0].sample_period_s
     windows: list[Window] = []
-    remarks: list[str] = []
+    whole = [without_spikes(one) for one in recordings]
+    recordings, remarks = [one for one, _ in whole], [said for _, spikes in whole for said in spikes]
     standing_still: list[str] = []
     has_speed, said_of_speed = _has_speed(recordings)
     remarks += said_of_speed
@@ -353,6 +355,7 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{least:.0f} samples a second",
             f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
+    check_sums(one, scales)
     _check_speed(one, voltage, scales)
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:

@@ -280,6 +280,10 @@ def _with_third_current(table: Table) -> Table:
     return replace(table, columns={k: v for k, v in columns.items() if k != "current_w_a"}, notes=(*table.notes, note))
 
 
+STOPS_AT_ONCE = 0.2
+"""Of its largest speed: no shaft that still turns so fast stands in the next row."""
+
+
 def to_running(table: Table) -> RunningRecording:
     """The table as a running-motor recording. NaN, gaps and jitter are left for the audit, which names them.
 
@@ -300,7 +304,8 @@ def to_running(table: Table) -> RunningRecording:
         )
     _require(table, _all_but_one(CURRENTS, columns), "a running-motor recording")
     _require(table, ("time_s", *(_all_but_one(line, columns) if is_line else phase)), "a running-motor recording")
-    table = _without_unmeasured(table, *on_one_clock(columns, (*CURRENTS, *voltages), table.source))
+    table = _as_recorded(table, (*CURRENTS, *voltages))
+    table = _without_unmeasured(table, *on_one_clock(table.columns, (*CURRENTS, *voltages), table.source))
     table = _without_still(_without_still(table, CURRENTS), voltages)
     columns = table.columns
     empty = np.full(columns["time_s"].size, np.nan)
@@ -319,6 +324,25 @@ def to_running(table: Table) -> RunningRecording:
         source=table.source,
         notes=table.notes,
     )
+
+
+def _as_recorded(table: Table, channels: Sequence[str]) -> Table:
+    """Rows in the order of their time, where they stand the other way round; without those at the end in which every channel and a speed that
+    has just been there are exactly zero: what a logger had reserved and did not fill."""
+    columns, notes, time = dict(table.columns), list(table.notes), table.columns["time_s"]
+    if time.size > 2 and np.all(np.diff(time) < 0.0):
+        columns = {name: values[::-1] for name, values in columns.items()}
+        notes.append(ReadingNote("backwards", "the rows run backwards in time: taken the other way round"))
+    speed = columns.get("speed_rad_per_s")
+    if speed is not None:
+        filled = np.flatnonzero(
+            np.any([columns[n] != 0.0 for n in (*channels, "speed_rad_per_s") if n in columns], axis=0)
+        )
+        last = int(filled[-1]) + 1 if filled.size else 0
+        if 0 < last < time.size and abs(speed[last - 1]) > STOPS_AT_ONCE * np.nanmax(np.abs(speed)):
+            columns = {name: values[:last] for name, values in columns.items()}
+            notes.append(ReadingNote("unfilled", f"the last {time.size - last} rows hold nothing but zeros: left out"))
+    return replace(table, columns=columns, notes=tuple(notes))
 
 
 def _require_currents_to_the_end(table: Table) -> None:

@@ -179,3 +179,18 @@ def test_at_standstill_a_current_that_stands_still_to_the_end_is_named_and_one_a
     for still, since in ((np.full(ROWS, 2.0), "0 s"), (np.where(FROM, 2.0, third), "1.25 s")):
         with pytest.raises(DataRefused, match=f"current_v_a stands at 2 A from {since} to the end"):
             to_standstill(Table({**columns, "current_v_a": still}, {}, "file.csv"))
+
+
+def test_rows_that_run_backwards_are_turned_and_rows_that_were_never_filled_left_out():
+    speed = np.full(ROWS, 150.0) + 0.01 * RNG.standard_normal(ROWS)
+    whole = fed(speed_rad_per_s=speed)
+    turned = to_running(Table({name: x[::-1] for name, x in whole.columns.items()}, {}, "fed.csv"))
+    assert np.array_equal(turned.time_s, TIME) and np.array_equal(turned.currents_a[1], whole.columns["current_v_a"])
+    assert [n.code for n in turned.notes] == ["backwards"]
+    unfilled = {name: x if name == "time_s" else np.where(TIME < 1.5, x, 0.0) for name, x in whole.columns.items()}
+    seen = to_running(Table(unfilled, {}, "fed.csv"))
+    assert seen.time_s.size == 3000 and [n.what for n in seen.notes] == [
+        "the last 1000 rows hold nothing but zeros: left out"
+    ]
+    coasted = {**unfilled, "speed_rad_per_s": np.where(TIME < 1.5, np.maximum(150.0 - 100.0 * TIME, 0.0), 0.0)}
+    assert to_running(Table(coasted, {}, "fed.csv")).time_s.size == ROWS
