@@ -125,7 +125,7 @@ def diagnose(
 
 
 def _conclude(record: Record, found: Found) -> Diagnosis:
-    left = lack_of_fit(found.problem, found.fit.machine)
+    left = lack_of_fit(found.problem, found.nearest)
     causes = tuple(sorted((_cause(found, one) for one in found.accepted), key=lambda c: -c.gain_share))
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain) if found.is_complete else UNFINISHED
