@@ -497,3 +497,11 @@ def test_a_current_that_a_smaller_voltage_does_not_drive_has_not_stopped():
 def test_a_current_below_a_converters_step_has_not_surely_flowed():
     reason, _ = stopping(0.6, lambda t: 20.0 * np.cos(300.0 * t), lambda t: 0.07 * np.cos(300.0 * t), step_a=0.1)
     assert reason is None
+
+
+def test_the_smallest_step_is_between_any_two_values_of_one_phase():
+    """In whatever order they came, and never between two phases."""
+    seen = np.array([[0.0, 1.0, 0.3], [5.0, 5.9, 5.0], [0.1, 0.1, 0.1]])
+    assert _smallest_step(seen, 0.0) == pytest.approx(0.3)
+    assert _smallest_step(seen, 0.2) == 0.2
+    assert _smallest_step(np.ones((3, 4)), 0.0) == 0.0
