@@ -81,20 +81,22 @@ def without_spikes(one: RunningRecording) -> tuple[RunningRecording, list[str]]:
 
 
 def _mended(x: Signal) -> tuple[Signal, int]:
-    at = np.fromiter(_spikes(x), dtype=np.int64)
+    if x.size < 9:
+        return x, 0
+    told = x.copy()  # by the cubic through its neighbours
+    told[2:-2] = (4.0 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6.0
+    at = np.fromiter(_spikes(x, np.nan_to_num(x - told)), dtype=np.int64)
     if at.size == 0 or at.size > MOST_SPIKES * x.size:
         return x, 0
     out = x.copy()
-    out[at] = (4.0 * (x[at - 1] + x[at + 1]) - x[at - 2] - x[at + 2]) / 6.0
+    out[at] = told[at]
     return out, int(at.size)
 
 
-def _spikes(x: Signal) -> Iterator[int]:
-    if x.size < 9 or not np.isfinite(x).any():
+def _spikes(x: Signal, off: Array) -> Iterator[int]:
+    """Where one sample alone is `off` its neighbours."""
+    if not np.isfinite(x).any():
         return
-    off = np.zeros(x.size)
-    off[2:-2] = x[2:-2] - (4.0 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6.0
-    off = np.nan_to_num(off)
     usual = float(np.median(np.abs(off))) / 0.6745
     least = max(SPIKE_SIGMA * usual, SPIKE * float(np.nanquantile(np.abs(x), MOSTLY)))
     for k in np.flatnonzero(np.abs(off) > least):

@@ -252,14 +252,10 @@ def _has_speed(recordings: Sequence[RunningRecording]) -> tuple[bool, list[str]]
 
 def _is_named_speed(one: RunningRecording) -> bool:
     """Whether the speed column holds one number of a shaft that turns, beside the current of a start."""
-    speed, current = one.speed_rad_per_s, np.sqrt(np.nanmean(np.square(one.currents_a), axis=0))
-    if (
-        speed is None
-        or not np.isfinite(speed).any()
-        or np.nanmax(np.abs(speed)) == 0.0
-        or np.nanmax(speed) > np.nanmin(speed)
-    ):
+    speed = one.speed_rad_per_s
+    if speed is None or not np.isfinite(speed).any() or not np.nanmax(speed) == np.nanmin(speed) != 0.0:
         return False
+    current = np.sqrt(np.nansum(np.square(one.currents_a), axis=0))  # rows without any are none of a start
     block = max(round(BLOCK_S / one.sample_period_s), 1)
     means = current[: current.size // block * block].reshape(-1, block).mean(axis=1)
     return bool(means.size and np.nanmax(means) > STARTS * np.nanmedian(means))

@@ -80,7 +80,7 @@ class Inverter:
         self._supervision: dict[str, Value] = {}
         self._signal: dict[str, Value] = {}
         self._read_retries = port.read_retries
-        port.patience_s = AT_REST * port.reply_timeout_s
+        self._repeat_reads()
 
     # --- who and how -------------------------------------------------------------------------------------------
     def identify(self) -> DriveIdentity:
@@ -247,8 +247,12 @@ class Inverter:
         CommissionerError; idempotent; legal in every state."""
         report = de_energise(self._items, self._watchdog_ms / 1000, self.sleep)
         if report.is_confirmed:
-            self.port.read_retries, self.port.patience_s = self._read_retries, AT_REST * self.port.reply_timeout_s
+            self._repeat_reads()
         return report
+
+    def _repeat_reads(self) -> None:
+        """As often as a drive at rest may be asked."""
+        self.port.read_retries, self.port.patience_s = self._read_retries, AT_REST * self.port.reply_timeout_s
 
     def implausible(self, held: Mapping[str, float], nameplate: Nameplate) -> list[Implausible]:
         """What of `held` no motor near this plate has. A commissioning map has proved its registers by its magic number."""

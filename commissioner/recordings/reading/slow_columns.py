@@ -71,11 +71,11 @@ def stood_still(columns: Mapping[str, Signal], channels: Sequence[str], *, is_cu
     still = {}
     for name in channels:
         values, others = columns[name], [columns[other] for other in channels if other != name]
-        ends = np.append(np.flatnonzero(np.diff(values)) + 1, values.size)
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1, [values.size]])
         rows = np.zeros(values.size, dtype=bool)
-        for begin, end in zip([0, *ends[:-1]], ends, strict=True):
-            run = slice(begin, end)
-            if end - begin >= LEAST_STILL and any(_goes_on(x, run) for x in others):
+        for k in np.flatnonzero(np.diff(edges) >= LEAST_STILL):
+            begin, run = edges[k], slice(edges[k], edges[k + 1])
+            if any(_goes_on(x, run) for x in others):
                 usual = max(float(np.nanmedian(np.abs(x[run]))) for x in others if np.isfinite(x[run]).any())
                 rows[run] = not is_current or abs(values[begin]) > NO_CURRENT * usual
         if rows.any():
