@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from sim.physics import effects
 from sim.physics import layout as at
@@ -115,6 +114,8 @@ def axis_error_v(plant: Plant, axis_deg: float, current_a: float) -> float:
 
     Off the multiples of 30 degrees the legs also push across the axis; the cross current that answers is found first.
     """
+    from scipy.optimize import brentq  # a third of the time that a simulated drive needs to begin
+
     resistance, lost = plant.machine.stator_resistance_ohm, _leg_law(plant)
     cross = brentq(lambda c: resistance * c + _leg_errors(lost, axis_deg, current_a, c)[1], -20.0, 20.0)
     return _leg_errors(lost, axis_deg, current_a, float(cross))[0]

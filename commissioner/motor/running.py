@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from commissioner.motor.circuit import InverseGamma, from_t_model, to_t_model
 from commissioner.motor.nameplate import Nameplate
@@ -78,6 +77,8 @@ def slip_at_power(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float, 
     def excess(slip: float) -> float:
         return 1.5 * voltage_v**2 * (1 / stator_impedance(circuit, supply_rad_per_s, slip)).real - power_w
 
+    from scipy.optimize import brentq, minimize_scalar
+
     edge = pull_out_slip(circuit, supply_rad_per_s)
     if excess(0.0) > 0.0:
         low, high = float(minimize_scalar(excess, bounds=(-edge, 0.0), method="bounded").x), 0.0
@@ -91,6 +92,8 @@ def slip_at_current(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float
     def excess(slip: float) -> float:
         return voltage_v / abs(stator_impedance(circuit, supply_rad_per_s, slip)) - current_a
 
+    from scipy.optimize import brentq
+
     low, high = 0.0, pull_out_slip(circuit, supply_rad_per_s)
     if excess(low) >= 0.0:
         return low
@@ -102,6 +105,8 @@ def slip_at_lag(circuit: TCircuit, supply_rad_per_s: float, lag_rad: float) -> f
 
     def lag(slip: float) -> float:
         return float(np.angle(stator_impedance(circuit, supply_rad_per_s, slip)))
+
+    from scipy.optimize import brentq, minimize_scalar
 
     way = 1.0 if lag_rad <= np.pi / 2 else -1.0
     edge = pull_out_slip(circuit, supply_rad_per_s)

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from commissioner.identify.batch import output_error
 from commissioner.identify.inverter.leg_law import LegLaw
@@ -124,6 +123,8 @@ def iron_flux(theta: Matrix, model: ModelChoice, stator_wb: float) -> float:
     """The inverse of `stator_flux`."""
     if theta[SPLIT] == 0.0:
         return stator_wb
+    from scipy.optimize import brentq
+
     beyond = partial(_beyond, theta, model, stator_wb)
     return float(brentq(beyond, 0.0, stator_wb)) if beyond(stator_wb) > 0.0 else stator_wb
 

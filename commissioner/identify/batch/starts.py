@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from commissioner.identify.intake.stretches import Stretch, tones_in
 from commissioner.identify.inverter.staircase import InverterError
@@ -46,6 +45,8 @@ def _fitted(
     stretches: Sequence[Stretch], period_s: float, box: ParameterBox, leg: InverterError | None, fewest: int, *,
     is_on_time: bool,
 ) -> tuple[InverseGamma, float] | None:  # fmt: skip
+    from scipy.optimize import least_squares
+
     stretch = max(stretches, key=lambda s: float(np.var(s.voltage_v)) * s.voltage_v.size)
     lost = leg.on_axis(stretch.current_a, stretch.axis_deg) if leg is not None else 0.0
     frequencies, admittances = _admittances(stretch.voltage_v, stretch.voltage_v - lost, stretch.current_a, period_s)

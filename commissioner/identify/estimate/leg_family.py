@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from commissioner.identify.batch.segments import BatchFit
@@ -87,6 +86,8 @@ def pairs_of(fits: Sequence[BatchFit]) -> list[Pair]:
 
 def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: Signal, root: Matrix) -> Pair:
     """Plateau, threshold's share and both knees (logarithms) by weighted least squares."""
+    from scipy.optimize import least_squares
+
     dead, drop = DEAD_TIME[names[0]], THRESHOLD[names[1]]
     plateau = max(peak(mean), 1e-6)
     typical = math.log(TYPICAL_KNEE * largest_a)

@@ -15,7 +15,6 @@ from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from commissioner.compiled import writable
 from commissioner.identify.excite.kernels import driven_peaks, sum_of_tones
@@ -191,6 +190,8 @@ def _minimax(
     on the others) and is begun anew where it ended, as a simplex may have collapsed (W. H. Press et al., Numerical
     Recipes, 3rd ed., 10.5).
     """
+    from scipy.optimize import minimize
+
     slow, fast = (-p / (2.0 * math.pi) for p in poles_per_s(machine))
     lowest = max(3.0 / seconds, 0.15 * slow)
     highest = min(0.05 / period_s, 3.0 * fast)  # above, skin effect and timing say more than the machine

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from commissioner.records import Signal
 
@@ -30,6 +29,8 @@ def running_mean_v(means_v: Signal, averaged: int) -> Signal:
     if rows < 2:
         return means_v.copy()
     total = np.concatenate([[0.0], np.cumsum(means_v)])
+    from scipy.interpolate import CubicHermiteSpline
+
     volt_periods = CubicHermiteSpline(np.arange(rows + 1), total, _at_edges(means_v))
     inside = np.asarray(volt_periods(np.arange(rows * averaged + 1) / averaged))
     inside[::averaged] = total

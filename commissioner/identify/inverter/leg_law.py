@@ -10,14 +10,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from commissioner.identify.inverter.leg_pair import FORM, drawn, of_legs
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.records import Signal
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Matrix = NDArray[np.float64]
 CORNER = 0.03
@@ -66,6 +69,8 @@ class LegLaw:
 
     @cached_property
     def _spline(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline
+
         values = np.vstack([np.zeros(self.size), np.eye(self.size)])
         return CubicSpline(np.append(0.0, self.knots), values, bc_type=("natural", "not-a-knot"))
 

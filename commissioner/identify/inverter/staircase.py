@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
@@ -213,6 +212,8 @@ class _ShapeFit:
 def _fit_shape(
     levels: Sequence[DcLevel], axis_deg: float, tail: float, largest: float, has_both_signs: bool
 ) -> _ShapeFit:
+    from scipy.optimize import least_squares
+
     voltage = np.array([level.voltage_v for level in levels])
     current = np.array([level.current_a for level in levels])
     start, scale, lower = _staircase_start(voltage, current, largest)

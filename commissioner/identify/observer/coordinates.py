@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from commissioner.errors import UsageError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox
-from commissioner.motor.standstill import poles_per_s, pulse_transfers
+from commissioner.motor.standstill import played, poles_per_s, pulse_transfers
 from commissioner.records import Signal
 
 Matrix = NDArray[np.float64]
@@ -103,9 +103,6 @@ def prior_covariance(prior: ParameterBox, filter_z: Matrix, period_s: float) -> 
 
 def regressor(machine: InverseGamma, filter_z: Matrix, period_s: float, voltage_v: Signal) -> Matrix:
     """w = (zeta_y, zeta_u) of the machine under the voltage, `(n, 4)`."""
-    from scipy.signal import lfilter
-
-    a1, a0, b1, b0 = pulse_transfers(np.array([machine.as_tuple()]), period_s)[0]
-    current = lfilter([0.0, b1, b0], [1.0, a1, a0], voltage_v)
-    columns = [lfilter([0.0, 1.0 - f], [1.0, -f], x) for x in (current, voltage_v) for f in filter_z]
+    current = played(pulse_transfers(np.array([machine.as_tuple()]), period_s)[0], voltage_v)
+    columns = [played(np.array([-f, 0.0, 1.0 - f, 0.0]), x) for x in (current, voltage_v) for f in filter_z]
     return np.column_stack(columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from contextlib import suppress
 from dataclasses import replace
 
@@ -243,7 +244,9 @@ def _if_in_delta(job: Job, findings: Findings, machine: InverseGamma) -> Inverse
 
 def warm_up(nameplate: Nameplate) -> None:
     """Run observer, guard, design and fit once on made-up samples: what has to be compiled is compiled before anything is
-    energised, and the motor does not wait for it between two tests."""
+    energised, what is imported late is there, and the motor does not wait for either between two tests."""
+    for library in ("scipy.interpolate", "scipy.optimize"):
+        importlib.import_module(library)
     period_s = 2e-4
     time_s = np.arange(WARM_UP_SAMPLES) * period_s
     signal = np.cos(2.0 * np.pi * time_s)

@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lfilter
 
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.standstill import pulse_transfers
+from commissioner.motor.standstill import played, pulse_transfers
 from commissioner.records import Signal
 
 
@@ -44,7 +43,7 @@ class Drawn:
             return None
         current_a = np.concatenate(self._current_a)
         lost_v = self.inverter.on_axis(current_a, self.axis_deg)
-        a1, a0, b1, b0 = pulse_transfers(np.array([self.typical.as_tuple()]), self.period_s)[0]
-        typical_a = lfilter([0.0, b1, b0], [1.0, a1, a0], np.concatenate(self._voltage_v) - lost_v)
+        transfer = pulse_transfers(np.array([self.typical.as_tuple()]), self.period_s)[0]
+        typical_a = played(transfer, np.concatenate(self._voltage_v) - lost_v)
         typical_rms_a = float(np.sqrt(np.mean(typical_a**2)))
         return float(np.sqrt(np.mean(current_a**2))) / typical_rms_a if typical_rms_a > 0.0 else None
