@@ -64,14 +64,14 @@ async def start(request: Request) -> Response:
     drives = [drive for drive in parts.library.drives() if drive.id != SIMULATOR]
     newest = await asyncio.to_thread(lambda: parts.archive.entries(limit=8))
     live = parts.desk.without_result()
-    cut = [entry for entry in newest if entry.outcome == "cut off" and entry.run not in {run.id for run in live}]
+    open_ends = await asyncio.to_thread(parts.archive.open_ends)
     return render(
         request,
         START,
         drives=drives,
         newest=newest,
         live=live,
-        cut=cut,
+        open_ends=[entry for entry in open_ends if entry.run not in {run.id for run in parts.desk.live()}],
         scenarios=SCENARIOS,
         profiles=parts.library.profiles(),
         scenario=parts.simulator.scenario,
@@ -354,8 +354,7 @@ def _ended_page(request: Request, place: Place, facts: Mapping[str, Any]) -> Res
     if (result.get("tune") or {}).get("rows"):
         return tuned_page(request, place, **facts)
     if identified(result) is not None and entry.outcome in ("commissioned", "rejected"):
-        is_written = entry.standing == "commissioned"
-        return render(request, DONE if is_written else RESULT, place, **facts)
+        return render(request, DONE if entry.standing.is_written else RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
 
 
@@ -388,7 +387,7 @@ async def _table(request: Request, run: str, what: Act) -> Response:
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
     place = _place(parts, run)
-    if what == "write-back" and parts.archive.find(run).standing == "commissioned":
+    if what == "write-back" and parts.archive.find(run).standing.is_written:
         return go(f"/runs/{run}/{what}/done")
     try:
         table = await plan(parts, run, what)

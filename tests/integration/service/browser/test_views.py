@@ -18,7 +18,7 @@ HIT = "() => window.hit !== undefined || document.querySelector('img[src=x]') !=
 @pytest.fixture(scope="module")
 def shelf(service, finished):
     """Runs to look at: one that is good, a later copy, one that was stopped, one whose name and origin are hostile."""
-    copies = {"later": "20991231-235959-simulated", "evil": "20991231-235958-<img src=x onerror=window.hit=1>"}
+    copies = {"later": f"{finished}-2", "evil": f"{finished[:15]}-<img src=x onerror=window.hit=1>"}
     for name in copies.values():
         service.add_copy(finished, name)
     request = service.runs / copies["evil"] / "request.json"
