@@ -12,9 +12,11 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.identify.analysis import identify
+from commissioner.operations.archive import report_run
 from commissioner.procedure import steps
 from commissioner.procedure.energised import excite
 from commissioner.procedure.steps import Findings
+from commissioner.report.run.standing import Standing
 from commissioner.run import write_accepted
 from commissioner.run.archive import replay as replaying
 from commissioner.run.archive.blocks import read_blocks
@@ -22,6 +24,10 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import learn_again, replay
 from commissioner.run.archive.summary import summarise
+from commissioner.run.archive.verify import verify
+from commissioner.run.index.index import find
+from commissioner.run.index.results import result_of
+from commissioner.run.index.rows import Wanted
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
 from tests.support.archive.chained import rechain
 from tests.support.sim_process import SimProcess
@@ -267,6 +273,30 @@ def test_a_changed_result_is_reported(fresh, tmp_path):
     document["flux_guard"]["peak_fraction"] += 0.01
     path.write_text(json.dumps(document))
     assert replay(path.parent).difference.archived["kind"] == "result"
+
+
+def test_a_run_killed_before_its_result_says_so_and_is_made_whole_from_its_samples(fresh, tmp_path):
+    """Every list had it as `commissioned`, and nobody its values."""
+    folder, before = tmp_path / fresh.name, json.loads((fresh / "result.json").read_text())
+    shutil.copytree(
+        fresh, folder, ignore=shutil.ignore_patterns("result.json", "report.html", "summary.json", "*.parquet")
+    )
+    lines = (folder / "journal.jsonl").read_text().splitlines(keepends=True)
+    end = next(number for number, line in enumerate(lines) if json.loads(line)["kind"] == "run_ended")
+    (folder / "journal.jsonl").write_text("".join(lines[: end + 1]))
+    row = json.loads(find(tmp_path, Wanted()).rows[0].document)
+    assert (row["outcome"], row["standing"], row["lacks_result"]) == ("commissioned", Standing.NOT_KEPT, True)
+    assert find(tmp_path, Wanted(outcome=Standing.NOT_KEPT)).total == 1 and "runs report" in row["reason"]
+    for use in (result_of, lambda run: write_accepted.write_accepted(run, None, "")):
+        with pytest.raises(DataRefused, match="has no result") as refused:
+            use(summarise(folder))
+        assert f"runs report {folder.name}" in refused.value.remedy
+    assert report_run(tmp_path, folder.name).losses == ()
+    assert json.loads((folder / "result.json").read_text()) == before
+    made = summarise(folder)
+    assert made.standing is Standing.COMMISSIONED and not made.lacks_result and made.reason == before["reason"]
+    assert verify(folder).losses == () and (folder / "recording.parquet").is_file() and result_of(made)
+    assert str(report_run(tmp_path, folder.name).report) == str(folder / "report.html")
 
 
 def test_what_a_diagnosis_added_to_the_result_is_no_difference():
