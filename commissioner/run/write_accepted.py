@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import cast
 
-from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError
+from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError, WriteBackFailed
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import archived_profile
@@ -141,6 +141,10 @@ def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | No
             check_token(_plan(run, ready, inverter, "write back", wanted), token)
             try:
                 report = inverter.write_circuit(circuit, ready.plate, ready.snapshot)
+            except WriteBackFailed as failed:
+                if failed.was_restored:
+                    note(journal, "snapshot_restored", failed.as_dict())
+                raise
             except OSError as failure:
                 raise write_lost(failure, journal) from failure
         note(journal, "parameters_written", report)

@@ -19,6 +19,7 @@ NAME = "summary.json"
 NOT_KEPT = frozenset({"folder", "result"})
 """Fields of a summary that `summary.json` is without: where the folder lies, the whole result."""
 RESULT, NOT_IDENTIFIED = "result.json", "not identified"
+GIVEN_BACK = f"{Held.AS_BEFORE}, read back"
 NO_RESULT, CAN_BE_MADE = (
     "the process ended before its result was kept",
     ": `commissioner runs report` makes it from the samples",
@@ -261,8 +262,13 @@ _TUNINGS = ("tuning_began", "tuned_once", "tuning_ended", "tunings_judged")
 
 def _written(records: list[Record]) -> tuple[str, str]:
     """Old, new, or unknown, and since when: the last announcement or confirmation in the journal decides."""
-    told = [(said, _text(line, "utc")) for line in records if (said := _word(line["kind"], line["record"]))]
-    return told[-1] if told else (Held.AS_BEFORE.value, "")
+    said, utc = Held.AS_BEFORE.value, ""
+    for line in records:
+        if word := _word(line["kind"], line["record"]):
+            said, utc = word, _text(line, "utc")
+        elif line["kind"] == "run_ended" and Held.of(said) is Held.RESTORED:
+            said, utc = GIVEN_BACK, ""  # by the run itself, as a tuning that only looks does
+    return said, utc
 
 
 def _word(kind: str, record: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -13,6 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from jinja2 import UndefinedError
 from pydantic import ValidationError
 
+from commissioner.errors import CommissionerError
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
 from commissioner.run.archive.documents import damaged, identified, origin_of
@@ -33,7 +35,7 @@ from commissioner.service.problems import Refusal
 from commissioner.service.routes.checks import make_checks
 from commissioner.service.routes.library import start_simulator
 from commissioner.service.routes.runs import RunWish, start_run
-from commissioner.service.routes.write import Act, act, drive_of, plan
+from commissioner.service.routes.write import Act, act, plan
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.feed import whole
 from commissioner.service.runs.live import live_document
@@ -423,17 +425,19 @@ async def written(request: Request, run: str, what: Act) -> Response:
         run=run,
         what=what,
         done=done["record"],
-        units=_units(drive_of(parts, run)),
+        units=await asyncio.to_thread(_units, parts, run),
         written_utc=done["utc"],
         motor=str(origin_of(parts.archive.request(run)).get("motor", "")),
     )
 
 
-def _units(drive: Drive | None) -> dict[str, str]:
-    """Of the drive's items, in the signs of a page."""
-    from commissioner.link.files.drive_file import load_profile
+def _units(parts: Parts, run: str) -> dict[str, str]:
+    """Of the drive's items by the drive file as the run had it, in the signs of a page; empty where none is kept."""
+    from commissioner.operations.write import RunRequest, items_of  # late: numpy
 
-    items = load_profile(drive.profile).items if drive is not None else {}
+    items: Mapping[str, Any] = {}
+    with contextlib.suppress(CommissionerError):
+        items = items_of(RunRequest(parts.archive.root, run))
     return {name: UNIT_SIGNS.get(item.unit, item.unit) for name, item in items.items()}
 
 
