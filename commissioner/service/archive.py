@@ -12,7 +12,7 @@ from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
 from commissioner.operations.history.runs import must_be_findable
 from commissioner.report.run.standing import Held, Standing
-from commissioner.run.archive.catalogue import by_age, read_run
+from commissioner.run.archive.catalogue import by_age, is_ahead, read_run
 from commissioner.run.archive.documents import identified, origin_of, read_document, read_result
 from commissioner.run.archive.summary import NOT_IDENTIFIED
 from commissioner.run.holding.unfinished import Word, left_by
@@ -118,6 +118,18 @@ class Archive:
             if not entry.standing.has_no_end and entry.drive != NOT_IDENTIFIED:
                 seen |= {entry.drive_key, entry.url}
         return found
+
+    def written_later(self, entry: Entry) -> Entry | None:
+        """Of the newest runs the one that changed what the drive holds last, where that is another one and came later."""
+        if entry.held is Held.AS_BEFORE:
+            return None
+        others = [
+            e
+            for e in self.entries(limit=LOOKED_THROUGH)
+            if e.drive_key == entry.drive_key and e.held_utc > entry.held_utc
+        ]
+        changed = [e for e in others if e.held not in (Held.AS_BEFORE, Held.NOT_KNOWN) and not is_ahead(e.held_utc)]
+        return max(changed, key=lambda e: e.held_utc, default=None)
 
     def find(self, run: str) -> Entry:
         """Refusal 404 where there is none of this id."""

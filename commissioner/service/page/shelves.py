@@ -10,9 +10,10 @@ from fastapi.responses import Response
 from pydantic import ValidationError
 
 from commissioner.service.access.accounts import Role
+from commissioner.service.access.pages import local
 from commissioner.service.access.visitors import COOKIE, check_token, parts_of
 from commissioner.service.page.band import Place
-from commissioner.service.page.frame import View, enter, enter_form, go, local, refused, remember, render
+from commissioner.service.page.frame import View, enter, enter_form, go, refused, remember, render
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.access import Credentials, log_in, log_out, set_cookie
 from commissioner.service.routes.history import compared, trend_of

@@ -15,6 +15,7 @@ from jinja2 import UndefinedError
 from pydantic import ValidationError
 
 from commissioner.errors import CommissionerError
+from commissioner.report.run.standing import Held
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
 from commissioner.run.archive.documents import damaged, identified, origin_of
@@ -55,6 +56,8 @@ DONE = replace(RESULT, step=8)
 WRITE = View("work/write.html", "What would be written into the drive", 7)
 JOURNALLED: Mapping[Act, str] = {"write-back": "parameters_written", "restore": "snapshot_restored"}
 """Records of a run's journal that say what was written into its drive."""
+LEFT: Mapping[Act, Held] = {"write-back": Held.NEW, "restore": Held.RESTORED}
+"""What the drive holds after each."""
 WRITTEN = View("work/written.html", "Written, read back and stored", 8)
 
 
@@ -259,10 +262,12 @@ async def check_again(request: Request, drive: str) -> Response:
 
 
 @router.get("/drives/{drive}/checks")
-async def checks(request: Request, drive: str, motor: str) -> Response:
+async def checks(request: Request, drive: str, motor: str = "") -> Response:
     """What was seen, with the time; exceptions first."""
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
+    if not motor:
+        return go(f"/drives/{drive}")
     known, chosen = parts.library.drive(drive), parts.library.motor(motor)
     document = parts.checks.get(f"{known.id} {chosen.id}")
     if document is None:
@@ -280,10 +285,12 @@ async def checks(request: Request, drive: str, motor: str) -> Response:
 
 
 @router.get("/drives/{drive}/energise")
-async def energise(request: Request, drive: str, motor: str) -> Response:
+async def energise(request: Request, drive: str, motor: str = "") -> Response:
     """What will happen to the motor, in volts, amperes and seconds; then the button to hold."""
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
+    if not motor:
+        return go(f"/drives/{drive}")
     return _energise_page(request, parts.library.drive(drive), parts.library.motor(motor))
 
 
@@ -344,6 +351,7 @@ async def run(request: Request, run: str) -> Response:
         "is_diagnosing": not is_over,
         "losses": await asyncio.to_thread(losses_at_sight, entry.folder) if is_over else (),
         "has_report": (entry.folder / "report.html").is_file(),
+        "later": await asyncio.to_thread(parts.archive.written_later, entry),
     }
     try:
         return _ended_page(request, place, facts)
@@ -414,7 +422,8 @@ async def written(request: Request, run: str, what: Act) -> Response:
     """What was written last, as the run's journal has it: looked at again, nothing is written again."""
     enter(request)
     parts = parts_of(request)
-    lines = await asyncio.to_thread(read_journal, parts.archive.find(run).folder / "journal.jsonl")
+    entry = parts.archive.find(run)
+    lines = await asyncio.to_thread(read_journal, entry.folder / "journal.jsonl")
     done = next((line for line in reversed(lines) if line["kind"] == JOURNALLED[what]), None)
     if done is None:
         return go(f"/runs/{run}")
@@ -427,6 +436,8 @@ async def written(request: Request, run: str, what: Act) -> Response:
         done=done["record"],
         units=await asyncio.to_thread(_units, parts, run),
         written_utc=done["utc"],
+        since="" if entry.held is LEFT[what] else entry.written,
+        later=await asyncio.to_thread(parts.archive.written_later, entry),
         motor=str(origin_of(parts.archive.request(run)).get("motor", "")),
     )
 

@@ -111,6 +111,35 @@ def test_the_start_page_says_what_a_write_that_did_not_end_has_left_now(tmp_path
     assert run not in said_at_the_start(tmp_path)
 
 
+def test_what_was_written_is_told_as_what_it_was_once_it_has_changed(tmp_path: Path) -> None:
+    """`The drive works with these values now` stood there after the restore, and after another run's write-back."""
+    run, later = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
+    client = TestClient(
+        create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data"))), base_url="http://127.0.0.1"
+    )
+
+    def write(name: str, kind: str) -> None:
+        writing = RunFolder(tmp_path / "runs" / name)
+        writing.journal(kind, {"is_stored": True, "written": []}, durable=True)
+        die(writing)
+
+    def said(path: str) -> str:
+        return client.get(f"/runs/{run}{path}", headers={"accept": "text/html"}).text
+
+    for name in (run, later):
+        make_run(tmp_path / "runs", name, result=result_of(name, MACHINE))
+    write(run, "parameters_written")
+    assert "works with these values now" in said("/write-back/done") and "A later run" not in said("")
+    write(later, "parameters_written")
+    assert "works with these values now" not in said("/write-back/done")
+    assert "A later run has changed what the drive holds:" in said("") and f'href="/runs/{later}"' in said("")
+    write(run, "snapshot_restored")
+    assert "A later run" not in said("") and "Since then, parameters in the drive: as before (restored)" in said(
+        "/write-back/done"
+    )
+    assert "works with these values now" in said("/restore/done")
+
+
 def test_the_start_page_tells_of_a_run_that_was_cut_off_until_its_drive_was_met_again(tmp_path: Path) -> None:
     cut, other, again = (f"2024010{n}-081500-simulated-000abc" for n in (1, 2, 3))
     make_run(tmp_path / "runs", cut, closed=False)
