@@ -223,7 +223,7 @@ def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen,
         return _Said(
             "unknown",
             t.gettext("State of the motor not known"),
-            t.say("The drive does not answer: %(what)s", what=seen.error),
+            t.say("The drive does not answer: %(what)s", what=t.tell(seen.error)),
             nothing,
         )
     return _Said("asking", t.gettext("State of the motor not known"), t.gettext("The drive is being asked"), nothing)

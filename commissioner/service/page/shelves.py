@@ -9,6 +9,7 @@ from fastapi import APIRouter, File, Form, Request
 from fastapi.responses import Response
 from pydantic import ValidationError
 
+from commissioner.report.run.standing import Standing
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.pages import local
 from commissioner.service.access.visitors import COOKIE, check_token, parts_of
@@ -40,8 +41,9 @@ async def archive(request: Request, motor: str = "", outcome: str = "", since: s
     )
     live = {run.id for run in parts.desk.without_result()}
     return render(
-        request, ARCHIVE, found=found, live=live, motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit
-    )
+        request, ARCHIVE, found=found, live=live, motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit,
+        standings=list(Standing),
+    )  # fmt: skip
 
 
 @router.get("/compare")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
@@ -456,9 +457,13 @@ def _place(parts: Parts, run: str) -> Place:
     return Place(run=run, drive=str(origin_of(parts.archive.request(run)).get("drive", "")))
 
 
+_SPELT = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae", "ł": "l"})
+
+
 def _slug(name: str, taken: set[str]) -> str:
     """An id from a name that a person gave, not taken yet."""
-    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:30] or "motor"
+    spelt = unicodedata.normalize("NFKD", name.lower().translate(_SPELT)).encode("ascii", "ignore").decode("ascii")
+    plain = re.sub(r"[^a-z0-9]+", "_", spelt).strip("_")[:30].strip("_") or "motor"
     return next(one for one in (plain, *(f"{plain}_{k}" for k in range(2, 1000))) if one not in taken)
 
 

@@ -66,7 +66,7 @@ def test_what_the_core_remarks_of_every_run_has_its_german():
     remarks = (
         LongerTest(8.0, (0.002,) * 4, (0.001,) * 4).sentence, LongerTest(8.0, (0.002,) * 4, (0.002,) * 4).sentence,
         TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
-        Standing.RESTORED_SINCE, Standing.ACCEPTED, Standing.UNSURE, Standing.NOT_KEPT, NO_RESULT, f"{NO_RESULT}{CAN_BE_MADE}", DATED_AHEAD, "as before, read back", "no load current", "not identified",
+        *Standing, NO_RESULT, f"{NO_RESULT}{CAN_BE_MADE}", DATED_AHEAD, "as before, read back", "no load current", "not identified",
         "Schneider Altivar ATV320, serial number not known",
         "orientations: 2; sensor gain and anisotropy need at least three: what the phases or their sensors differ by is in the values, and "
         "not all of it in the intervals",
