@@ -5,18 +5,21 @@ import json
 import math
 import pickle
 import shutil
-from contextlib import closing
+from contextlib import closing, nullcontext
+from io import BytesIO
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from commissioner.errors import DataRefused
+from commissioner.errors import DataRefused, WriteBackFailed
 from commissioner.identify.analysis import identify
+from commissioner.link.drive.facts import Action, Intent
 from commissioner.operations.archive import report_run
 from commissioner.procedure import steps
 from commissioner.procedure.energised import excite
 from commissioner.procedure.steps import Findings
-from commissioner.report.run.standing import Standing
+from commissioner.report.run.standing import Held, Standing
 from commissioner.run import write_accepted
 from commissioner.run.archive import replay as replaying
 from commissioner.run.archive.blocks import read_blocks
@@ -226,6 +229,42 @@ def test_a_result_that_its_samples_do_not_lead_to_is_not_written(fresh, tmp_path
     if forged:
         assert refusal.value.what.endswith("in record.parameters.stator_resistance_ohm.value")
         assert refusal.value.limit == 3.1
+
+
+@pytest.mark.parametrize(("was_restored", "held"), [(True, Held.RESTORED), (False, Held.OLD_OR_NEW)])
+def test_a_write_that_failed_and_was_taken_back_leaves_nobody_in_doubt(
+    fresh, tmp_path, monkeypatch, was_restored, held
+):
+    """It stood as `old or new` until somebody restored what the drive held already."""
+    folder = tmp_path / fresh.name
+    shutil.copytree(fresh, folder)
+    with closing(RunFolder(folder)) as archive:
+        archive.journal("snapshot_restored", {})
+
+    class Failing:
+        def __init__(self, _port, _profile, announce):
+            self.announce = announce
+
+        def identify(self):
+            pass
+
+        def write_circuit(self, *_):
+            self.announce(Intent(Action.COMMIT, {}))
+            failed = WriteBackFailed("x", step="x", value=1, limit=2, remedy="x")
+            failed.was_restored = was_restored
+            raise failed
+
+    stubs = {
+        "open_port": lambda *_, **__: BytesIO(),
+        "Inverter": Failing,
+        "_plan": lambda *_: None,
+        "check_token": lambda *_: None,
+    }
+    for name, stub in {**stubs, "Mastery": lambda *_: nullcontext(SimpleNamespace(take=lambda _: None))}.items():
+        monkeypatch.setattr(write_accepted, name, stub)
+    with pytest.raises(WriteBackFailed):
+        write_accepted.write_accepted(summarise(folder), None, "token")
+    assert summarise(folder).held is held
 
 
 def test_a_result_whose_samples_are_lost_is_not_written(fresh, tmp_path, monkeypatch):

@@ -160,6 +160,11 @@ def intent(action):
         ([("about_to", intent("store")), ("parameters_written", {}), ("about_to", intent("stage"))], "old or new"),
         ([("parameters_written", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
         (
+            [("about_to", intent("tune")), ("snapshot_restored", {}), ("run_ended", {})],
+            "as before, read back",
+        ),  # by itself
+        ([("run_ended", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
+        (
             [("parameters_written", {"store_count_after": 18, "endurance_writes": 100000})],
             "new, read back and stored; 18 of 100000 writes",
         ),
