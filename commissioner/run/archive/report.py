@@ -82,9 +82,9 @@ def make_report(run: RunSummary) -> None:
     job, findings = learn_again(path)
     if lacks_result(path, journal):
         with closing(RunFolder(path)) as folder:
-            keep_result(
-                folder, job.nameplate, (job.parameter_names, job.parameter_factors), findings, read_end(path, journal)
-            )
+            if lacks_result(path, read_journal(path / "journal.jsonl")):  # nobody has kept it meanwhile
+                names = (job.parameter_names, job.parameter_factors)
+                keep_result(folder, job.nameplate, names, findings, read_end(path, journal))
         return
     errors = [line["record"] for line in journal if line["kind"] == "error"]
     ended = RunEnded(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from commissioner.encoding import JsonObject
 from commissioner.errors import DataRefused
 from commissioner.report.run.standing import Held, Standing
 from commissioner.run.archive.documents import read_document, read_result
-from commissioner.run.archive.journal import Record, read_journal
+from commissioner.run.archive.journal import Record, is_being_written, read_journal
 from commissioner.run.archive.seal import as_closed
 
 NAME = "summary.json"
@@ -100,11 +100,12 @@ class RunSummary:
 
 def summarise(folder: Path) -> RunSummary:
     """The run in `folder`, from its result if it has one, else from its journal."""
-    return summary_of(folder, read_journal(folder / "journal.jsonl"))
+    return summary_of(folder, read_journal(folder / "journal.jsonl"), goes_on=is_being_written)
 
 
-def summary_of(folder: Path, records: list[Record]) -> RunSummary:
-    """As `summarise`, the journal's records read already."""
+def summary_of(folder: Path, records: list[Record], goes_on: Callable[[Path], bool] = lambda _: False) -> RunSummary:
+    """As `summarise`, the journal's records read already; `goes_on`: whether a process may still keep the result, not asked by itself."""
+    lacks = lacks_result(folder, records) and not goes_on(folder)
     end: Record = next(reversed(_of(records, "run_ended")), {})
     start: Record = next(iter(_of(records, "run_started")), {})
     identity: Record = next(iter(_of(records, "drive_identified")), {})
@@ -117,7 +118,7 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
         run=folder.name,
         folder=str(folder),
         outcome=_text(end, "outcome") or Standing.CUT_OFF.value,
-        reason=_reason(folder, records, end),
+        reason=_reason(records, end, lacks=lacks),
         drive=_drive(identity),
         energised_s=_seconds(end.get("energised_s")),
         written=written,
@@ -136,7 +137,7 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
         motor_serial=_text(named, "motor_serial"),
         motor_name=_text(origin, "motor"),
         held_utc=held_utc,
-        lacks_result=lacks_result(folder, records),
+        lacks_result=lacks,
     )
 
 
@@ -233,10 +234,10 @@ def lacks_result(folder: Path, records: list[Record]) -> bool:
     return is_judged and not (folder / RESULT).exists() and RESULT not in as_closed(records)
 
 
-def _reason(folder: Path, records: list[Record], end: Record) -> str:
+def _reason(records: list[Record], end: Record, *, lacks: bool) -> str:
     """Why the run ended as it did; of one that did not come so far, how far it came."""
     said = _text(end, "reason") or _last_state(records)
-    if not lacks_result(folder, records):
+    if not lacks:
         return said
     return f"{said}; {NO_RESULT}" + (CAN_BE_MADE if _of(records, "job") else "")
 
