@@ -23,7 +23,7 @@ def shelf(service, finished):
         service.add_copy(finished, name)
     request = service.runs / copies["evil"] / "request.json"
     told = json.loads(request.read_text("utf-8"))
-    told["origin"] = {"person": EVIL, "by": EVIL, "drive": EVIL, "motor": EVIL}
+    told["origin"] = {"person": EVIL, "by": EVIL, "drive": EVIL, "motor": EVIL + 80 * "Ü"}
     request.write_text(json.dumps(told), encoding="utf-8")
     stopped = service.start_run()
     service.wait_energised(stopped)
