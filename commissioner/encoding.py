@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Container, Mapping
-from enum import Enum
+from enum import Enum, StrEnum
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -28,7 +28,7 @@ def plain(value: Any, *, without: Container[str] = ()) -> Any:
         shown = [f for f in dataclasses.fields(value) if not f.metadata.get("is_hidden") and f.name not in without]
         return {f.name: plain(getattr(value, f.name)) for f in shown}
     if isinstance(value, Enum):
-        return value.name.lower()
+        return value.value if isinstance(value, StrEnum) else value.name.lower()
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "_asdict"):

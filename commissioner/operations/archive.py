@@ -13,7 +13,9 @@ from commissioner.procedure.assembly import assemble, columns
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_folder, find_run, must_be_archive, run_folders
 from commissioner.run.archive.documents import Loss, damaged, read_saved
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import Difference, replay
+from commissioner.run.archive.summary import lacks_result
 from commissioner.run.archive.verify import DAMAGED, Verified, losses_at_sight, refuse_damage, verify
 from commissioner.run.index.index import unlike
 from commissioner.run.index.store import NAME as INDEX
@@ -56,7 +58,7 @@ def report_run(runs: Path, run: str) -> Reported:
 
     summary = find_run(runs, run)
     report = Path(summary.folder) / "report.html"
-    if not report.is_file():
+    if not report.is_file() or lacks_result(report.parent, read_journal(report.parent / "journal.jsonl")):
         make_report(summary)
     return Reported(summary.run, str(report), losses_at_sight(report.parent))
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from commissioner.link.drive.facts import WriteReport
+from commissioner.link.files.drive_file import archived_profile
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.registers.profile import Item
 from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.documents import read_saved
 from commissioner.run.archive.report import mark_restored, mark_written
 from commissioner.run.archive.summary import RunSummary
 from commissioner.run.restore import Restored
@@ -82,6 +86,11 @@ def write_run(request: RunRequest, token: str, key: bytes | None = None) -> Writ
     written = Written(summary.run, write_accepted(summary, request.drive, token, key))
     mark_written(summary, key)
     return written
+
+
+def items_of(request: RunRequest) -> Mapping[str, Item]:
+    """The drive's items, by the drive file as the run had it: number, unit and convention of what is written. DataRefused: none is kept."""
+    return archived_profile(str(read_saved(Path(request.find().folder), "request.json", "profile")["profile"])).items
 
 
 def write_recorded(request: WriteRequest, identified: Identified, observe: Observe = nobody) -> Commissioned:

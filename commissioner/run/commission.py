@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.link.drive.facts import Action, Intent
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile, reference
 from commissioner.link.wire.url import parse_url, without_secrets
-from commissioner.motor.nameplate import Nameplate, plate_doubts
+from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.energised.excite import warm_up
 from commissioner.procedure.findings import LeftUnfinished, RunEnded, WarmingUp
@@ -23,10 +21,9 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.records import DriveIdentity
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import RunDocument
-from commissioner.report.run.summary import summarise
 from commissioner.run.archive.documents import archive_lost
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.archive.report import write_report
+from commissioner.run.archive.report import keep_result
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -182,24 +179,12 @@ def _announce(folder: RunFolder, intent: Intent) -> None:
 
 
 def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> RunDocument:
-    """Recording, result and report, in that order: each needs only the one before."""
+    """What came of the run, kept and covered."""
     try:
-        return _saved(order, folder, findings, ended)
+        result = keep_result(folder, order.nameplate, names_of(order.profile), findings, ended)
+        folder.cover()
+        return result
     except OSError as failure:
         raise archive_lost(
             folder.path, failure, f"; the run itself ended as {ended.outcome}: {ended.reason}"
         ) from failure
-
-
-def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> RunDocument:
-    metadata: dict[str, float | str] = {
-        key: value for key, value in dataclasses.asdict(order.nameplate).items() if value is not None
-    }
-    if findings.winding_degc is not None:
-        metadata["winding_temperature_degc"] = findings.winding_degc
-    folder.write_recording(metadata)
-    result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names_of(order.profile)))
-    result["remarks"] = [*result["remarks"], *plate_doubts(order.nameplate), *findings.of_the_archive]
-    write_report(folder, result, findings)
-    folder.cover()
-    return result

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import cast
 
-from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError
+from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError, WriteBackFailed
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import archived_profile
@@ -22,12 +22,12 @@ from commissioner.records import DriveIdentity, ParameterSnapshot, drive_words
 from commissioner.registers.convention import as_in_drive, drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import PlanRow, WritePlan
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
+from commissioner.report.run.standing import Standing
 from commissioner.run.archive.documents import read_saved
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
-from commissioner.run.archive.summary import RunSummary
+from commissioner.run.archive.summary import NO_RESULT, RunSummary
 from commissioner.run.archive.verify import Verified, refuse_damage
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
@@ -141,6 +141,10 @@ def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | No
             check_token(_plan(run, ready, inverter, "write back", wanted), token)
             try:
                 report = inverter.write_circuit(circuit, ready.plate, ready.snapshot)
+            except WriteBackFailed as failed:
+                if failed.was_restored:
+                    note(journal, "snapshot_restored", failed.as_dict())
+                raise
             except OSError as failure:
                 raise write_lost(failure, journal) from failure
         note(journal, "parameters_written", report)
@@ -193,12 +197,17 @@ def _circuit(run: RunSummary) -> InverseGamma:
             f"a write-back or restore of {run.run} did not end: the drive holds its old or its new parameters", step=STEP, value=run.written,
             limit="a drive that was read since", remedy=f"`commissioner restore {run.run}` first, then write back",
         )  # fmt: skip
-    if run.standing not in (ACCEPTED, RESTORED_SINCE) or not all(name in parameters for name in PARAMETERS):
+    if run.lacks_result:
+        raise DataRefused(
+            f"{run.run} has no result: {NO_RESULT}", step=STEP, value=run.standing.value, limit=Standing.ACCEPTED.value,
+            remedy=f"`commissioner runs report {run.run}` makes it from the samples, where the run took some",
+        )  # fmt: skip
+    if not run.standing.may_be_written or not all(name in parameters for name in PARAMETERS):
         raise DataRefused(
             f"{run.run} has nothing to write",
             step=STEP,
-            value=run.standing,
-            limit=ACCEPTED,
+            value=run.standing.value,
+            limit=Standing.ACCEPTED.value,
             remedy="choose a run whose result was accepted and is not in the drive",
         )
     return InverseGamma(*(float(parameters[name]["value"]) for name in PARAMETERS))

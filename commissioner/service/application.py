@@ -18,6 +18,7 @@ from starlette.types import Scope
 from commissioner.service import problems
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import HEADERS, Gate
+from commissioner.service.access.head import Heads
 from commissioner.service.access.visitors import check_role, visitor_of
 from commissioner.service.contract.description import describe_answers
 from commissioner.service.page import views
@@ -65,6 +66,7 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
                 uploads=("/api/recordings", "/recordings"),
                 refuse_upload=_refuse_upload,
             ),
+            Middleware(Heads),
         ],
     )
     app.state.parts, app.state.url = parts, url

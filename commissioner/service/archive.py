@@ -11,17 +11,22 @@ from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
 from commissioner.motor.quantities import plate_words
 from commissioner.operations.history.runs import must_be_findable
-from commissioner.run.archive.catalogue import age, read_run
+from commissioner.report.run.standing import Held, Standing
+from commissioner.run.archive.catalogue import by_age, is_ahead, read_run
 from commissioner.run.archive.documents import identified, origin_of, read_document, read_result
-from commissioner.run.archive.summary import AS_BEFORE
+from commissioner.run.archive.summary import NOT_IDENTIFIED
+from commissioner.run.holding.unfinished import Word, left_by
 from commissioner.run.index.rows import Wanted, utc_of
 from commissioner.service.contract.runs import RunWithoutResult
 from commissioner.service.problems import Refusal
 
+LOOKED_THROUGH = 100
+"""Of the newest runs: what an older one left has been met since."""
+
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of the list. `motor` is an id of the library, or empty for runs from the command line."""
+    """One line of the list. `motor` is an id of the library, or empty for runs from the command line; `held_utc`: since when the drive holds what it holds; `lacks_result`: the run judged, and its process ended before that was kept."""
 
     run: str
     utc: str
@@ -31,18 +36,47 @@ class Entry:
     drive: str
     person: str
     outcome: str
-    standing: str
+    standing: Standing
     reason: str
     energised_s: float | None
     written: str
     parameters: Mapping[str, Measured] | None
     flux_wb: float | None
     folder: Path
+    serial_number: int | None
+    url: str
+    held_utc: str
+    lacks_result: bool
+
+    @property
+    def drive_key(self) -> str:
+        """Tells drives apart: the number, where one has none or did not answer the address."""
+        return f"#{self.serial_number}" if self.serial_number is not None else self.url
+
+    @property
+    def held(self) -> Held:
+        """Which parameter set the drive holds, as `written` says it."""
+        return Held.of(self.written)
+
+    @property
+    def is_unknown(self) -> bool:
+        """Only the drive can tell which parameter set it holds."""
+        return self.held is Held.OLD_OR_NEW
+
+    @property
+    def can_be_made(self) -> bool:
+        """Its result, from the samples it took."""
+        return self.lacks_result and _bytes(self.folder / "blocks.bin") > 0
+
+    @property
+    def is_restored(self) -> bool:
+        """What the run found in the drive was the last to be written there by it."""
+        return self.held is Held.RESTORED
 
     @property
     def can_restore(self) -> bool:
         """The drive may hold other values than the run found, and those are kept."""
-        return not self.written.startswith(AS_BEFORE) and (self.folder / "snapshot.json").is_file()
+        return self.held not in (Held.AS_BEFORE, Held.RESTORED) and (self.folder / "snapshot.json").is_file()
 
 
 class Archive:
@@ -65,6 +99,37 @@ class Archive:
                 if len(found) >= limit:
                     break
         return found
+
+    def open_ends(self) -> list[Entry]:
+        """Of the newest runs those, newest first, that left something to look after: cut off, and no later run on the drive came to its
+        end; or a write that did not end, and nobody has written or restored since."""
+        newest = self.entries(limit=LOOKED_THROUGH)
+        by_drive: dict[str, list[Entry]] = {}
+        for entry in newest:
+            by_drive.setdefault(entry.drive_key, []).append(entry)
+        left = {left_by(Word(e.run, e.held, e.held_utc) for e in those) for those in by_drive.values()}
+        seen: set[str] = set()
+        found: list[Entry] = []
+        for entry in newest:
+            if entry.run in left or (
+                entry.standing.has_no_end and not entry.is_unknown and entry.drive_key not in seen
+            ):
+                found.append(entry)
+            if not entry.standing.has_no_end and entry.drive != NOT_IDENTIFIED:
+                seen |= {entry.drive_key, entry.url}
+        return found
+
+    def written_later(self, entry: Entry) -> Entry | None:
+        """Of the newest runs the one that changed what the drive holds last, where that is another one and came later."""
+        if entry.held is Held.AS_BEFORE:
+            return None
+        others = [
+            e
+            for e in self.entries(limit=LOOKED_THROUGH)
+            if e.drive_key == entry.drive_key and e.held_utc > entry.held_utc
+        ]
+        changed = [e for e in others if e.held not in (Held.AS_BEFORE, Held.NOT_KNOWN) and not is_ahead(e.held_utc)]
+        return max(changed, key=lambda e: e.held_utc, default=None)
 
     def find(self, run: str) -> Entry:
         """Refusal 404 where there is none of this id."""
@@ -120,7 +185,7 @@ class Archive:
     def _names(self) -> list[str]:
         try:
             with os.scandir(self.root) as entries:
-                return sorted((e.name for e in entries if _is_name(e.name)), key=age, reverse=True)
+                return sorted((e.name for e in entries if _is_name(e.name)), key=by_age(), reverse=True)
         except OSError:
             return []
 
@@ -159,6 +224,10 @@ def _read_entry(folder: Path) -> Entry:
         identified(summary.result or {}, with_errors=False),
         (summary.result or {}).get("holds_for_stator_flux_wb"),
         folder,
+        summary.serial_number,
+        summary.url,
+        summary.held_utc or summary.started_utc,
+        summary.lacks_result,
     )
 
 
@@ -178,6 +247,13 @@ def _is_name(name: str) -> bool:
     return (
         0 < len(name) < 200 and not name.startswith(".") and "/" not in name and "\\" not in name and "\0" not in name
     )
+
+
+def _bytes(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
 
 
 def _mtime(path: Path) -> int:

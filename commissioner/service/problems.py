@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
+from starlette.routing import Match
 
 from commissioner.errors import NOTHING, OF_DISK, Aborted, CommissionerError, DataRefused, DriveError, UsageError
 from commissioner.validation import wanted
@@ -175,7 +176,9 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
         title = {404: "there is no such page or route", 405: "this method is not offered here"}.get(
             error.status_code, str(error.detail)
         )
-        headers = dict(error.headers or {})
+        headers = {name.lower(): value for name, value in (error.headers or {}).items()} | (
+            {"allow": _allowed(request)} if error.status_code == 405 else {}
+        )
         return answer(
             request,
             Refusal(
@@ -188,6 +191,19 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
                 remedy="/openapi.json lists what there is",
             ),
         )
+
+
+METHODS = ("GET", "POST", "PUT", "DELETE", "PATCH")
+
+
+def _allowed(request: Request) -> str:
+    """All that the path takes: of two routes with one path, each knows only its own."""
+    taken = [
+        one
+        for one in METHODS
+        if any(r.matches({**request.scope, "method": one})[0] is Match.FULL for r in request.app.routes)
+    ]
+    return ", ".join([*taken, *(["HEAD"] if "GET" in taken else [])])
 
 
 def _unreadable_form(said: str) -> Refusal:

@@ -5,16 +5,21 @@ import json
 import math
 import pickle
 import shutil
-from contextlib import closing
+from contextlib import closing, nullcontext
+from io import BytesIO
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from commissioner.errors import DataRefused
+from commissioner.errors import DataRefused, WriteBackFailed
 from commissioner.identify.analysis import identify
+from commissioner.link.drive.facts import Action, Intent
+from commissioner.operations.archive import report_run
 from commissioner.procedure import steps
 from commissioner.procedure.energised import excite
 from commissioner.procedure.steps import Findings
+from commissioner.report.run.standing import Held, Standing
 from commissioner.run import write_accepted
 from commissioner.run.archive import replay as replaying
 from commissioner.run.archive.blocks import read_blocks
@@ -22,6 +27,10 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import learn_again, replay
 from commissioner.run.archive.summary import summarise
+from commissioner.run.archive.verify import verify
+from commissioner.run.index.index import find
+from commissioner.run.index.results import result_of
+from commissioner.run.index.rows import Wanted
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
 from tests.support.archive.chained import rechain
 from tests.support.sim_process import SimProcess
@@ -222,6 +231,42 @@ def test_a_result_that_its_samples_do_not_lead_to_is_not_written(fresh, tmp_path
         assert refusal.value.limit == 3.1
 
 
+@pytest.mark.parametrize(("was_restored", "held"), [(True, Held.RESTORED), (False, Held.OLD_OR_NEW)])
+def test_a_write_that_failed_and_was_taken_back_leaves_nobody_in_doubt(
+    fresh, tmp_path, monkeypatch, was_restored, held
+):
+    """It stood as `old or new` until somebody restored what the drive held already."""
+    folder = tmp_path / fresh.name
+    shutil.copytree(fresh, folder)
+    with closing(RunFolder(folder)) as archive:
+        archive.journal("snapshot_restored", {})
+
+    class Failing:
+        def __init__(self, _port, _profile, announce):
+            self.announce = announce
+
+        def identify(self):
+            pass
+
+        def write_circuit(self, *_):
+            self.announce(Intent(Action.COMMIT, {}))
+            failed = WriteBackFailed("x", step="x", value=1, limit=2, remedy="x")
+            failed.was_restored = was_restored
+            raise failed
+
+    stubs = {
+        "open_port": lambda *_, **__: BytesIO(),
+        "Inverter": Failing,
+        "_plan": lambda *_: None,
+        "check_token": lambda *_: None,
+    }
+    for name, stub in {**stubs, "Mastery": lambda *_: nullcontext(SimpleNamespace(take=lambda _: None))}.items():
+        monkeypatch.setattr(write_accepted, name, stub)
+    with pytest.raises(WriteBackFailed):
+        write_accepted.write_accepted(summarise(folder), None, "token")
+    assert summarise(folder).held is held
+
+
 def test_a_result_whose_samples_are_lost_is_not_written(fresh, tmp_path, monkeypatch):
     folder = tmp_path / fresh.name
     shutil.copytree(fresh, folder)
@@ -267,6 +312,30 @@ def test_a_changed_result_is_reported(fresh, tmp_path):
     document["flux_guard"]["peak_fraction"] += 0.01
     path.write_text(json.dumps(document))
     assert replay(path.parent).difference.archived["kind"] == "result"
+
+
+def test_a_run_killed_before_its_result_says_so_and_is_made_whole_from_its_samples(fresh, tmp_path):
+    """Every list had it as `commissioned`, and nobody its values."""
+    folder, before = tmp_path / fresh.name, json.loads((fresh / "result.json").read_text())
+    shutil.copytree(
+        fresh, folder, ignore=shutil.ignore_patterns("result.json", "report.html", "summary.json", "*.parquet")
+    )
+    lines = (folder / "journal.jsonl").read_text().splitlines(keepends=True)
+    end = next(number for number, line in enumerate(lines) if json.loads(line)["kind"] == "run_ended")
+    (folder / "journal.jsonl").write_text("".join(lines[: end + 1]))
+    row = json.loads(find(tmp_path, Wanted()).rows[0].document)
+    assert (row["outcome"], row["standing"], row["lacks_result"]) == ("commissioned", Standing.NOT_KEPT, True)
+    assert find(tmp_path, Wanted(outcome=Standing.NOT_KEPT)).total == 1 and "runs report" in row["reason"]
+    for use in (result_of, lambda run: write_accepted.write_accepted(run, None, "")):
+        with pytest.raises(DataRefused, match="has no result") as refused:
+            use(summarise(folder))
+        assert f"runs report {folder.name}" in refused.value.remedy
+    assert report_run(tmp_path, folder.name).losses == ()
+    assert json.loads((folder / "result.json").read_text()) == before
+    made = summarise(folder)
+    assert made.standing is Standing.COMMISSIONED and not made.lacks_result and made.reason == before["reason"]
+    assert verify(folder).losses == () and (folder / "recording.parquet").is_file() and result_of(made)
+    assert str(report_run(tmp_path, folder.name).report) == str(folder / "report.html")
 
 
 def test_what_a_diagnosis_added_to_the_result_is_no_difference():

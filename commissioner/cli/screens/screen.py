@@ -22,7 +22,7 @@ from commissioner.cli.screens.sentence import Sentence
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.motor.quantities import FIVE
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE, finding_sentences, standing
+from commissioner.report.run.standing import Standing, finding_sentences, standing
 from commissioner.run.archive.documents import Loss
 from commissioner.text import LONGEST, in_unit, visible
 from commissioner.text import shown as cut
@@ -188,15 +188,11 @@ def wear(count: int, fraction: float) -> str:
     return f"writes of the drive's memory so far: {count}, {fraction:.3%} of its life"
 
 
-_MARKS = {
-    "commissioned": "[green]✓ commissioned[/]",
-    ACCEPTED: f"[yellow]✓ {ACCEPTED}[/]",
-    RESTORED_SINCE: f"[yellow]✓ {RESTORED_SINCE}[/]",
-    UNSURE: f"[red]? {UNSURE}[/]",
-    "rejected": "[yellow]✗ rejected[/]",
-    "aborted": "[yellow]■ aborted[/]",
-    "faulted": "[red]✗ faulted[/]",
-}
+_MARKS: Mapping[str, tuple[str, str]] = {
+    Standing.COMMISSIONED: ("green", "✓"), Standing.ACCEPTED: ("yellow", "✓"), Standing.RESTORED_SINCE: ("yellow", "✓"),
+    Standing.REJECTED: ("yellow", "✗"), Standing.ABORTED: ("yellow", "■"), Standing.FAULTED: ("red", "✗"),
+}  # fmt: skip
+"""Colour and sign; of any other red and a question."""
 
 
 OUTCOME_WIDTH, NARROW = 14, 100
@@ -216,7 +212,12 @@ def outcome_cell(standing: str) -> str:
 
 def outcome_mark(standing: str) -> str:
     """The outcome in its colour; a run that was cut off is red."""
-    return _MARKS.get(standing, f"[red]? {text(standing)}[/]")
+    colour, sign = _MARKS.get(standing, ("red", "?"))
+    return f"[{colour}]{sign} {text(standing)}[/]"
+
+
+_WRITTEN: Mapping[str, str] = {Standing.RESTORED_SINCE: "restored", Standing.UNSURE: "not known"}
+"""Whether what was written is in the drive now; else it is."""
 
 
 def result(document: Mapping[str, Any], standing_now: str = "") -> None:
@@ -234,13 +235,13 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             table(
                 "",
                 ("", "value", "± 95 %", "in the drive before", "change", "written"),
-                _rows(document, {RESTORED_SINCE: "restored", UNSURE: "not known"}.get(standing_now, "yes")),
+                _rows(document, _WRITTEN.get(standing_now, "yes")),
                 right=(1, 2, 3, 4),
             )
         )
         for remark in (*finding_sentences(document), *document.get("remarks", ())):
             out.print(f"  [dim]•[/] {escape(signs(remark))}")
-        if (standing_now or standing(document)) == ACCEPTED:
+        if (standing_now or standing(document)) == Standing.ACCEPTED:
             again = "" if document.get("tune") else f"`commissioner write-back {escape(str(document['run']))}` or "
             out.print(
                 f"  [dim]•[/] the drive still holds its old values; {again}the same call with --write-back writes the new ones"

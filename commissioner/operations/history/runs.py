@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import UsageError
+from commissioner.report.run.standing import Standing
 from commissioner.run.archive.catalogue import find_folder, must_be_archive, read_run
 from commissioner.run.archive.documents import Loss, read_result
-from commissioner.run.archive.summary import STANDINGS, RunSummary
+from commissioner.run.archive.summary import RunSummary
 from commissioner.run.index.index import Found, Refreshed
 from commissioner.run.index.index import find as look_up
 from commissioner.run.index.index import refresh as bring_into_step
@@ -74,9 +75,9 @@ def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:
 
 def must_be_findable(wanted: Wanted) -> None:
     """UsageError: a date that is none, an outcome that no run has; an empty list would say that there is no such run."""
-    if wanted.outcome and wanted.outcome not in STANDINGS:
+    if wanted.outcome and wanted.outcome not in list(Standing):
         raise UsageError(
-            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(STANDINGS), remedy="ask for one of these",
+            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(Standing), remedy="ask for one of these",
         )  # fmt: skip
     for name in ("since", "until"):
         _check_date(getattr(wanted, name), name)

@@ -12,7 +12,7 @@ from commissioner.operations.history.motors import runs_of
 from commissioner.operations.history.runs import Archive
 from commissioner.recordings.baseline import read
 from commissioner.records import in_words
-from commissioner.run.archive.catalogue import read_run
+from commissioner.run.archive.catalogue import DATED_AHEAD, is_ahead, read_run
 from commissioner.run.archive.verify import changed
 from commissioner.run.index.results import has_result
 from commissioner.run.index.years import measured_in, seconds
@@ -38,10 +38,12 @@ def trend(archive: Archive, motor: str, picture: Path | None = None) -> MotorTre
         summary = read_run(Path(row.folder))
         if changed(Path(row.folder), "result.json"):
             left_out.append(f"{row.run}: result.json is not as the run left it")
+        elif is_ahead(summary.started_utc):
+            left_out.append(f"{row.run}: {DATED_AHEAD}")
         elif has_result(summary):
             measured.append(measured_in(summary))
         else:
-            left_out.append(f"{row.run}: {summary.outcome}, without parameters")
+            left_out.append(f"{row.run}: {summary.standing}, without parameters")
     if not measured:
         raise DataRefused(
             f"no run of {motor} identified it", step="trend", value=f"{len(left_out)} runs without parameters", limit="one with them",

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from commissioner.motor.quantities import four_digits, plate_words
 from commissioner.procedure.checks import check_name, check_unit
 from commissioner.report.run.quantities import BY_FIELD, FOUR, QUANTITIES, Quantity
-from commissioner.report.run.standing import ACCEPTED
+from commissioner.report.run.standing import Standing
 from commissioner.report.run.subject import Record, Subject
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.marks import Column, Text
@@ -67,7 +67,7 @@ def _said(subject: Subject) -> tuple[str, Text]:
     """Title and sentence; the title of a run that went wrong says what the drive holds."""
     tests = len(subject.tests)
     agree = f", the {spelled(tests, 'test')} agree" if tests > 1 else ""
-    if subject.standing == ACCEPTED:
+    if subject.standing is Standing.ACCEPTED:
         return (
             "Accepted, not written: the drive holds its old values",
             f"Each value is surer than it must be{agree}, and {_within(subject)}. Nothing was written into the drive.",
@@ -342,7 +342,7 @@ def _on_curve(point: Record) -> str:
 
 
 def _next(subject: Subject) -> Iterator[Text]:
-    if subject.standing == ACCEPTED:
+    if subject.standing is Standing.ACCEPTED:
         yield marks.coded(
             f"Write the values, if the drive shall work with them: `commissioner write-back {subject.run}`"
         )

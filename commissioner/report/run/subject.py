@@ -12,7 +12,7 @@ import numpy as np
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.procedure.steps import Findings
 from commissioner.records import Signal
-from commissioner.report.run.standing import standing
+from commissioner.report.run.standing import Standing, standing
 
 Record = Mapping[str, Any]
 DAY_S = 86400.0
@@ -92,7 +92,7 @@ class Subject:
         return str(self.result["outcome"])
 
     @property
-    def standing(self) -> str:
+    def standing(self) -> Standing:
         return standing(self.result)
 
     @property

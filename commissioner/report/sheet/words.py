@@ -29,7 +29,7 @@ def typeset(text: str) -> str:
     """Signs, and no break before a unit; an angle's sign stands at its number."""
     for plain, sign in _SIGNS:
         text = text.replace(plain, sign)
-    text = re.sub(r"(\d) deg\b", r"\1°", text)
+    text = re.sub(r"(\d) ohm\b", rf"\1{NBSP}Ω", re.sub(r"(\d) deg\b", r"\1°", text))
     return re.sub(r"([\d…]) us\b", rf"\1{NBSP}µs", re.sub(r"([\d…]) ?%", rf"\1{NBSP}%", text))
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import itertools
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.run.archive.summary import RunSummary, read_summary, sound_result, summarise, unreadable
 
-DIGITS = tuple("0123456789")
+AHEAD = dt.timedelta(minutes=10)
+"""So much the clock of the computer that made a run may differ from ours."""
+DATED_AHEAD = "its time has not come yet: it was made by a clock that was ahead"
+"""Why a run says nothing of a motor over the years."""
 
 
 def read_runs(root: Path, *, with_results: bool = True) -> list[RunSummary]:
@@ -36,16 +41,25 @@ def find_run(root: Path, name: str) -> RunSummary:
 
 def run_folders(root: Path) -> list[Path]:
     """Every folder of a run, newest first, also one whose journal is gone; none where there is no archive."""
-    return (
-        sorted((p for p in root.iterdir() if _is_run(p)), key=lambda p: age(p.name), reverse=True)
-        if root.is_dir()
-        else []
-    )
+    age = by_age()
+    return sorted(filter(_is_run, root.iterdir()), key=lambda p: age(p.name), reverse=True) if root.is_dir() else []
 
 
-def age(name: str) -> tuple[bool, str]:
-    """By which runs are ordered: an id begins with its time; a folder that somebody called otherwise is never the newest."""
-    return name[:1] in DIGITS, name
+def names_until() -> str:
+    """Runs of all times up to now are called less than this."""
+    return (dt.datetime.now(dt.UTC) + AHEAD).strftime("%Y%m%d-%H%M%S~")
+
+
+def by_age() -> Callable[[str], tuple[bool, str]]:
+    """By which runs are ordered: an id begins with its time; a folder that somebody called otherwise is never the newest, nor is one
+    whose time has not come, as a clock that was ahead has called it."""
+    until = names_until()
+    return lambda name: ("0" <= name < until, name)
+
+
+def is_ahead(utc: str) -> bool:
+    """Whether a record was written at a time that has not come yet: by a clock that was ahead, or ours has been put back."""
+    return utc > (dt.datetime.now(dt.UTC) + AHEAD).isoformat()
 
 
 def must_be_archive(root: Path) -> None:
@@ -60,7 +74,7 @@ def must_be_archive(root: Path) -> None:
 def find_folder(root: Path, name: str) -> Path:
     """As `find_run`, its folder; also by the path that a shell completes, `runs/ID/`. UsageError: none or several."""
     given, name = name, _id_of(root, name)
-    names = sorted(os.listdir(root), key=age, reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
+    names = sorted(os.listdir(root), key=by_age(), reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
     if name == "last":
         matching = list(itertools.islice(filter(_has_journal, (root / one for one in names)), 1))
     else:

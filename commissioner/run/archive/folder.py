@@ -28,7 +28,7 @@ from commissioner.recordings.whole import whole_file
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import append_frame, frame, read_blocks
 from commissioner.run.archive.documents import damaged, open_no_link
-from commissioner.run.archive.journal import Journal, read_journal
+from commissioner.run.archive.journal import LOCK, Journal, read_journal
 from commissioner.run.archive.origin import machine_part, this_process
 from commissioner.run.archive.seal import CLOSED, TO_COME, as_closed, cover_of, covers, seal, to_come
 from commissioner.run.archive.summary import NAME as SUMMARY
@@ -38,8 +38,6 @@ from commissioner.run.index.index import note
 if TYPE_CHECKING:
     from filelock import FileLock
 
-LOCK = ".lock.part"
-"""Held by whoever writes into the folder; gone when it is closed. By its ending no part of the run."""
 LOCK_S = 30.0
 """So long is waited for another writer: a session on a run that is over takes a second, on a busy computer ten."""
 

@@ -23,6 +23,24 @@ from commissioner.run.archive.documents import open_no_link, read_document
 FIRST = 64 * "0"
 """What stands for the digest of the line before the first."""
 Record = dict[str, Any]
+LOCK = ".lock.part"
+"""Held by whoever writes into the folder; gone when it is closed. By its ending no part of the run."""
+
+
+def is_being_written(folder: Path) -> bool:
+    """Whether a process has the folder now; False also where its disk knows no locks."""
+    if not (folder / LOCK).exists():
+        return False
+    from filelock import FileLock, Timeout  # late: hardly any list asks
+
+    lock = FileLock(folder / LOCK, thread_local=False)
+    try:
+        with lock.acquire(timeout=0):
+            return False
+    except Timeout:
+        return True
+    except OSError:
+        return False
 
 
 class Journal:

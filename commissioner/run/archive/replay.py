@@ -103,8 +103,7 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     again = _decide_again(job, findings, journal, folder, announcer, with_end=is_by_itself)
     replayed, is_alike = _up_to_a_difference(archived, again)
     if is_alike and is_by_itself and (folder / "result.json").is_file():
-        ended = _ended(folder, next(line["record"] for line in journal if line["kind"] == "run_ended"))
-        formed = summarise(findings, ended, folder.name, job.parameter_names, job.parameter_factors)
+        formed = summarise(findings, read_end(folder, journal), folder.name, job.parameter_names, job.parameter_factors)
         archived += _result(read_saved(folder, "result.json"), formed)
         replayed += _result(formed, formed)
     difference = _first_difference(archived, replayed, may_go_on=not is_by_itself or salvage, may_end=salvage)
@@ -143,7 +142,9 @@ def _check_whole(folder: Path, journal: list[dict[str, Any]]) -> None:
             raise damaged(folder, path.name, f"record {line.get('n')} where {number} belongs")
 
 
-def _ended(folder: Path, record: Any) -> RunEnded:
+def read_end(folder: Path, journal: list[dict[str, Any]]) -> RunEnded:
+    """How the run ended, of a journal that says so. DataRefused: damaged."""
+    record = next(line["record"] for line in journal if line["kind"] == "run_ended")
     try:
         return RunEnded(**record)
     except TypeError as error:

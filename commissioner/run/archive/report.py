@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from contextlib import closing, suppress
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, UsageError
+from commissioner.motor.nameplate import Nameplate, plate_doubts
 from commissioner.procedure.findings import RunEnded
 from commissioner.report.page import with_notice, with_notices_of
 from commissioner.report.run.contract import RunDocument
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
-from commissioner.run.archive.replay import learn_again
-from commissioner.run.archive.summary import RunSummary, read_file
+from commissioner.run.archive.replay import learn_again, read_end
+from commissioner.run.archive.summary import RunSummary, lacks_result, read_file
 
 if TYPE_CHECKING:
     from commissioner.procedure.steps import Findings
@@ -53,13 +56,37 @@ def _mark(run: RunSummary, sentence: str, key: bytes | None) -> None:
         folder.save_text(page.name, with_notice(page.read_text("utf-8"), sentence.format(when)))
 
 
+def keep_result(
+    folder: RunFolder, nameplate: Nameplate, names: tuple[Mapping[str, str], Mapping[str, float]], findings: Findings, ended: RunEnded
+) -> RunDocument:  # fmt: skip
+    """Recording, result and report of a run that has ended, in that order: each needs only the one before. `names`: of the drive's
+    parameters and their factors, as `job.names_of` tells them."""
+    from commissioner.report.run.summary import summarise
+
+    metadata: dict[str, float | str] = {key: value for key, value in asdict(nameplate).items() if value is not None}
+    if findings.winding_degc is not None:
+        metadata["winding_temperature_degc"] = findings.winding_degc
+    folder.write_recording(metadata)
+    result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names))
+    result["remarks"] = [*result["remarks"], *plate_doubts(nameplate), *findings.of_the_archive]
+    write_report(folder, result, findings)
+    return result
+
+
 def make_report(run: RunSummary) -> None:
-    """`report.html` of the run. DataRefused where it never reached its drive."""
+    """`report.html` of the run, and its result where the run had judged and could not keep it. DataRefused where it never reached its drive."""
     from commissioner.report.run.summary import summarise
 
     path = Path(run.folder)
+    journal = read_journal(path / "journal.jsonl")
     job, findings = learn_again(path)
-    errors = [line["record"] for line in read_journal(path / "journal.jsonl") if line["kind"] == "error"]
+    if lacks_result(path, journal):
+        with closing(RunFolder(path)) as folder:
+            if lacks_result(path, read_journal(path / "journal.jsonl")):  # nobody has kept it meanwhile
+                names = (job.parameter_names, job.parameter_factors)
+                keep_result(folder, job.nameplate, names, findings, read_end(path, journal))
+        return
+    errors = [line["record"] for line in journal if line["kind"] == "error"]
     ended = RunEnded(
         run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s, errors[-1] if errors else None
     )  # fmt: skip

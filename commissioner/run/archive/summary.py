@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import DataRefused
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
+from commissioner.report.run.standing import Held, Standing
 from commissioner.run.archive.documents import read_document, read_result
-from commissioner.run.archive.journal import Record, read_journal
+from commissioner.run.archive.journal import Record, is_being_written, read_journal
+from commissioner.run.archive.seal import as_closed
 
 NAME = "summary.json"
 NOT_KEPT = frozenset({"folder", "result"})
 """Fields of a summary that `summary.json` is without: where the folder lies, the whole result."""
+RESULT, NOT_IDENTIFIED = "result.json", "not identified"
+GIVEN_BACK = f"{Held.AS_BEFORE}, read back"
+NO_RESULT, CAN_BE_MADE = (
+    "the process ended before its result was kept",
+    ": `commissioner runs report` makes it from the samples",
+)
+"""Said of such a run; the latter where it applied a test of ours."""
 NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
-AS_BEFORE, OLD_OR_NEW, NEW, CUT_OFF, UNREADABLE = "as before", "old or new", "new", "cut off", "unreadable"
-RESTORED = f"{AS_BEFORE} (restored)"
-STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, UNSURE, "rejected", "aborted", "faulted", CUT_OFF, UNREADABLE)
-"""How a run can have ended, or stand."""
 
 
 def motor_names(summary: Mapping[str, Any]) -> tuple[str, ...]:
@@ -32,7 +36,8 @@ def motor_names(summary: Mapping[str, Any]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """`written` says which parameter set the drive holds after the run, as far as the run could know. `motor`: the plate;
+    """`written` says which parameter set the drive holds after the run, as far as the run could know, `held_utc` since when, empty where it
+    holds what it held before. `lacks_result`: it judged, and its process ended before that was kept. `motor`: the plate;
     `parameters`: value and standard error of each; both empty where the run did not get so far. `motor_tag`, `motor_serial`: which
     motor it is, as a person said; `motor_name`: under which name the plate was given. `energised_s`: None of a run that was cut off."""
 
@@ -57,6 +62,8 @@ class RunSummary:
     motor_tag: str = ""
     motor_serial: str = ""
     motor_name: str = ""
+    held_utc: str = ""
+    lacks_result: bool = False
 
     @property
     def motor_id(self) -> str:
@@ -69,37 +76,36 @@ class RunSummary:
         return motor_names(vars(self))
 
     @property
-    def standing(self) -> str:
+    def held(self) -> Held:
+        """Which parameter set the drive holds, as `written` says it."""
+        return Held.of(self.written)
+
+    @property
+    def standing(self) -> Standing:
         """The outcome, and whether the drive holds what came of it."""
-        if self.outcome != "commissioned":
-            return self.outcome
-        if self.is_unknown:
-            return UNSURE
-        if self.written.startswith(RESTORED):
-            return RESTORED_SINCE
-        return "commissioned" if self.written.startswith(NEW) else ACCEPTED
+        return Standing.of(self.outcome, self.held, lacks_result=self.lacks_result)
 
     @property
     def holds(self) -> str:
         """What the drive holds, where the outcome alone would let one think otherwise: new values behind a run that was cut off after it
         had written them; else empty."""
-        if self.is_unknown:
-            return OLD_OR_NEW
-        return NEW if self.outcome != "commissioned" and self.written.startswith(NEW) else ""
+        is_told = self.is_unknown or (self.held is Held.NEW and self.outcome != Standing.COMMISSIONED)
+        return self.held.value if is_told else ""
 
     @property
     def is_unknown(self) -> bool:
         """Only the drive can tell which parameter set it holds."""
-        return self.written.startswith(OLD_OR_NEW)
+        return self.held is Held.OLD_OR_NEW
 
 
 def summarise(folder: Path) -> RunSummary:
     """The run in `folder`, from its result if it has one, else from its journal."""
-    return summary_of(folder, read_journal(folder / "journal.jsonl"))
+    return summary_of(folder, read_journal(folder / "journal.jsonl"), goes_on=is_being_written)
 
 
-def summary_of(folder: Path, records: list[Record]) -> RunSummary:
-    """As `summarise`, the journal's records read already."""
+def summary_of(folder: Path, records: list[Record], goes_on: Callable[[Path], bool] = lambda _: False) -> RunSummary:
+    """As `summarise`, the journal's records read already; `goes_on`: whether a process may still keep the result, not asked by itself."""
+    lacks = lacks_result(folder, records) and not goes_on(folder)
     end: Record = next(reversed(_of(records, "run_ended")), {})
     start: Record = next(iter(_of(records, "run_started")), {})
     identity: Record = next(iter(_of(records, "drive_identified")), {})
@@ -107,14 +113,15 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
     serial = identity.get("serial_number")
     origin = _mapping(request.get("origin"))
     named: Mapping[str, Any] = next(reversed(_of(records, NAMED)), origin)
+    written, held_utc = _written(records)
     return RunSummary(
         run=folder.name,
         folder=str(folder),
-        outcome=_text(end, "outcome") or CUT_OFF,
-        reason=_text(end, "reason") or _last_state(records),
+        outcome=_text(end, "outcome") or Standing.CUT_OFF.value,
+        reason=_reason(records, end, lacks=lacks),
         drive=_drive(identity),
         energised_s=_seconds(end.get("energised_s")),
-        written=_written(records),
+        written=written,
         result=result or None,
         serial_number=serial if isinstance(serial, int) and not isinstance(serial, bool) else None,
         started_utc=_text(records[0], "utc") if records else "",
@@ -129,6 +136,8 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
         motor_tag=_text(named, "motor_tag"),
         motor_serial=_text(named, "motor_serial"),
         motor_name=_text(origin, "motor"),
+        held_utc=held_utc,
+        lacks_result=lacks,
     )
 
 
@@ -150,7 +159,9 @@ def unreadable(folder: Path, error: Exception) -> RunSummary:
     what = getattr(error, "what", "") or f"{type(error).__name__}: {error}"
     if isinstance(error, FileNotFoundError):
         what = f"its {Path(error.filename).name} is missing"
-    return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", None, "not known")
+    return RunSummary(
+        folder.name, str(folder), Standing.UNREADABLE.value, what, "not known", None, Held.NOT_KNOWN.value
+    )
 
 
 def sound_result(folder: Path) -> JsonObject | None:
@@ -169,7 +180,7 @@ def read_file(path: Path) -> JsonObject:
 def _is_typed(summary: RunSummary) -> bool:
     texts = (
         "outcome", "reason", "drive", "written", "started_utc", "ended_utc", "person", "host", "version", "url", "profile", "motor_tag",
-        "motor_serial", "motor_name",
+        "motor_serial", "motor_name", "held_utc",
     )  # fmt: skip
     return (
         all(isinstance(getattr(summary, name), str) for name in texts)
@@ -178,6 +189,7 @@ def _is_typed(summary: RunSummary) -> bool:
         and isinstance(summary.parameters, dict)
         and all(map(_is_quantity, summary.parameters.values()))
         and isinstance(summary.serial_number, int | None)
+        and isinstance(summary.lacks_result, bool)
     )
 
 
@@ -205,13 +217,29 @@ def _seconds(value: object) -> float | None:
 
 def _drive(identity: Record) -> str:
     if not identity:
-        return "not identified"
+        return NOT_IDENTIFIED
     number = identity.get("serial_number")
     return (
         f"{identity.get('drive_type')} #{number}"
         if number
         else f"{identity.get('drive_type')}, serial number not known"
     )
+
+
+def lacks_result(folder: Path, records: list[Record]) -> bool:
+    """Whether the run measured and judged, and its process ended before it had kept what came of it; not where the result was there, and
+    is gone."""
+    ends = [end.get("outcome") for end in _of(records, "run_ended")]
+    is_judged = ends[-1:] in ([Standing.COMMISSIONED], [Standing.REJECTED])
+    return is_judged and not (folder / RESULT).exists() and RESULT not in as_closed(records)
+
+
+def _reason(records: list[Record], end: Record, *, lacks: bool) -> str:
+    """Why the run ended as it did; of one that did not come so far, how far it came."""
+    said = _text(end, "reason") or _last_state(records)
+    if not lacks:
+        return said
+    return f"{said}; {NO_RESULT}" + (CAN_BE_MADE if _of(records, "job") else "")
 
 
 def _last_state(records: list[Record]) -> str:
@@ -233,17 +261,26 @@ _TUNINGS = ("tuning_began", "tuned_once", "tuning_ended", "tunings_judged")
 """Records of a tuning by the drive itself; another may begin after one has been done."""
 
 
-def _written(records: list[Record]) -> str:
-    """Old, new, or unknown: the last announcement or confirmation in the journal decides."""
-    said = AS_BEFORE
+def _written(records: list[Record]) -> tuple[str, str]:
+    """Old, new, or unknown, and since when: the last announcement or confirmation in the journal decides."""
+    said, utc = Held.AS_BEFORE.value, ""
     for line in records:
-        if line["kind"] == "parameters_written":
-            said = NEW + _kept(line["record"]) + _wear(line["record"])
-        elif line["kind"] == "snapshot_restored":
-            said = RESTORED + _wear(line["record"])
-        elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
-            said = f"{OLD_OR_NEW}{_mixed(line['record'])}: read the drive, or `commissioner restore` this run"
-    return said
+        if word := _word(line["kind"], line["record"]):
+            said, utc = word, _text(line, "utc")
+        elif line["kind"] == "run_ended" and Held.of(said) is Held.RESTORED:
+            said, utc = GIVEN_BACK, ""  # by the run itself, as a tuning that only looks does
+    return said, utc
+
+
+def _word(kind: str, record: Any) -> str:
+    """What the drive holds from this record of the journal on; empty of one that does not say."""
+    if kind == "parameters_written":
+        return Held.NEW + _kept(record) + _wear(record)
+    if kind == "snapshot_restored":
+        return Held.RESTORED + _wear(record)
+    if kind == "about_to" and _touches_parameters(record):
+        return f"{Held.OLD_OR_NEW}{_mixed(record)}: read the drive, or `commissioner restore` this run"
+    return ""
 
 
 def _mixed(intent: Mapping[str, Any]) -> str:

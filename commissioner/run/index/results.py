@@ -14,7 +14,7 @@ from commissioner.identify.estimate.common_ground import Result
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.procedure.states import State
 from commissioner.run.archive.documents import identified, is_quantity, number
-from commissioner.run.archive.summary import RunSummary
+from commissioner.run.archive.summary import NO_RESULT, RunSummary
 
 
 def has_result(run: RunSummary) -> bool:
@@ -24,6 +24,11 @@ def has_result(run: RunSummary) -> bool:
 
 def result_of(run: RunSummary) -> Result:
     """A run's combined result as its document holds it. DataRefused: it identified nothing."""
+    if run.lacks_result:
+        raise DataRefused(
+            f"{run.run} has no result: {NO_RESULT}", step="compare", value=run.standing.value, limit="a run with parameters",
+            remedy=f"`commissioner runs report {run.run}` makes it from the samples, where the run took some",
+        )  # fmt: skip
     if not has_result(run):
         raise DataRefused(
             f"{run.run} identified nothing", step="compare", value=f"{run.outcome}, no parameters", limit="a run with parameters",

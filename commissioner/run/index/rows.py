@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 from commissioner.encoding import plain
 from commissioner.motor.quantities import plate_words
+from commissioner.run.archive.catalogue import names_until
 from commissioner.run.archive.summary import NOT_KEPT, RunSummary, motor_names
 
-SCHEMA = 3
+SCHEMA = 4
 """Of an index, raised with every change of what a row holds; an earlier one is filled anew from the folders."""
 CREATE = (
     "CREATE TABLE runs (place TEXT NOT NULL, run TEXT NOT NULL, folder TEXT NOT NULL, journal_bytes BIGINT NOT NULL, "
@@ -83,9 +84,9 @@ class Wanted:
     limit: int = 0
 
 
-DATED, CALLED = "run{c} >= '0' AND run{c} < ':'", "(run{c} < '0' OR run{c} >= ':')"
-"""As `catalogue.age`: what is not called by its time comes behind all that is. Ranges of the primary key: to sort by an expression
-reads every document."""
+DATED, CALLED = "run{c} >= '0' AND run{c} < '{until}'", "(run{c} < '0' OR run{c} >= '{until}')"
+"""As `catalogue.by_age`: what is not called by a time that has been comes behind all that is. Ranges of the primary key: to sort by an
+expression reads every document."""
 _ALL_WORDS = "lower(run || ' ' || motor || ' ' || motor_serial || ' ' || plate || ' ' || drive || ' ' || person || ' ' || outcome || ' ' || reason)"
 
 
@@ -126,9 +127,9 @@ def select(wanted: Wanted, place: str, *, is_shared: bool) -> tuple[tuple[str, s
     where = f" WHERE {' AND '.join(parts)}"
     limit = " LIMIT :most" if wanted.limit > 0 else ""
     count = f"SELECT count(*) FROM {source}{where}"
-    collation = ' COLLATE "C"' if is_shared else ""
+    collation, until = ' COLLATE "C"' if is_shared else "", names_until()
     dated, called = (
-        f"SELECT {COLUMNS} FROM {source}{where} AND {half.format(c=collation)} ORDER BY run{collation} DESC{limit}"
+        f"SELECT {COLUMNS} FROM {source}{where} AND {half.format(c=collation, until=until)} ORDER BY run{collation} DESC{limit}"
         for half in (DATED, CALLED)
     )
     return (dated, called), count, bound
@@ -136,9 +137,12 @@ def select(wanted: Wanted, place: str, *, is_shared: bool) -> tuple[tuple[str, s
 
 def row_of(summary: RunSummary, place: str, stamp: tuple[int, int]) -> Row:
     """The summary as a row; `stamp`: size and time of the journal that it was made from."""
-    document = _rounded(plain(summary, without=NOT_KEPT)) | {"folder": summary.folder, "standing": summary.standing}
+    document = _rounded(plain(summary, without=NOT_KEPT)) | {
+        "folder": summary.folder,
+        "standing": summary.standing.value,
+    }
     return Row(
-        place, summary.run, summary.folder, *stamp, summary.started_utc or utc_of(summary.run), summary.outcome, summary.standing,
+        place, summary.run, summary.folder, *stamp, summary.started_utc or utc_of(summary.run), summary.outcome, summary.standing.value,
         summary.reason, summary.drive, summary.holds, summary.person, summary.motor_id,
         summary.motor_serial, ", ".join(filter(None, (plate_words(summary.motor), summary.motor_name))), json.dumps(document, separators=(",", ":"), allow_nan=False),
     )  # fmt: skip

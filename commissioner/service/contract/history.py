@@ -73,9 +73,16 @@ class TrendChange(TypedDict):
     is_beyond_chance: bool
 
 
+class LeftOut(TypedDict):
+    run: str
+    why: str
+
+
 class TrendDocument(TypedDict):
-    """Oldest first; `changes` by parameter, empty of fewer than two points and where the first and the last cannot be compared."""
+    """Oldest first; `changes` by parameter, empty of fewer than two points and where the first and the last cannot be compared.
+    `left_out`: runs that stand at no known time, each with why."""
 
     motor: str
     points: list[TrendPoint]
     changes: dict[str, TrendChange]
+    left_out: list[LeftOut]

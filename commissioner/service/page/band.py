@@ -6,7 +6,7 @@ import datetime as dt
 from dataclasses import dataclass
 
 from commissioner.records import drive_words
-from commissioner.report.run.standing import RESTORED_SINCE, UNSURE
+from commissioner.report.run.standing import Standing
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.access.visitors import Visitor
 from commissioner.service.library import Drive
@@ -223,7 +223,7 @@ def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen,
         return _Said(
             "unknown",
             t.gettext("State of the motor not known"),
-            t.say("The drive does not answer: %(what)s", what=seen.error),
+            t.say("The drive does not answer: %(what)s", what=t.tell(seen.error)),
             nothing,
         )
     return _Said("asking", t.gettext("State of the motor not known"), t.gettext("The drive is being asked"), nothing)
@@ -269,9 +269,9 @@ def _ended(run: LiveRun, standing: str, word: str, t: Texts) -> tuple[str, str, 
         return "off", text, t.say("stopped %(time)s", time=_time(str(state.stop["utc"])))
     if outcome == "commissioned":
         done = {
-            "commissioned": "Measured and written",
-            RESTORED_SINCE: "Measured, written, and the old values restored",
-            UNSURE: "Measured. The drive holds its old or its new parameters",
+            Standing.COMMISSIONED.value: "Measured and written",
+            Standing.RESTORED_SINCE.value: "Measured, written, and the old values restored",
+            Standing.UNSURE.value: "Measured. The drive holds its old or its new parameters",
         }.get(standing, "Measured: every parameter within its acceptance. Not written")
         return "off", f"{t.gettext(done)}. {word}", nothing
     what = {"rejected": "Measured, not good enough", "aborted": "The run was aborted"}.get(outcome, "The run failed")

@@ -13,6 +13,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import ChainableUndefined, Environment, FileSystemLoader, select_autoescape
 
 from commissioner.service.access.accounts import Role
+from commissioner.service.access.pages import local, seen_at
 from commissioner.service.access.visitors import LOCAL, Visitor, check_role, check_token, parts_of, visitor_of
 from commissioner.service.page.band import Place, band_of
 from commissioner.service.page.texts import LANGUAGES, Texts, texts_of
@@ -104,7 +105,7 @@ def render(request: Request, view: View, place: Place = NOWHERE, *, status: int 
             theme=theme if theme in THEMES else "",
             language=texts.language,
             version=request.app.version,
-            path=request.url.path + (f"?{request.url.query}" if request.url.query else ""),
+            path=seen_at(request),
             script_texts={message: texts.gettext(message) for message in SCRIPT_TEXTS},
             parts=parts,
             **context,
@@ -120,7 +121,7 @@ def enter(request: Request, role: Role = Role.VIEWER) -> Visitor:
     """Who looks at a page. Redirects to the log-in where nobody is known."""
     who = visitor_of(request)
     if who.role is None:
-        raise ToLogin(request.url.path)
+        raise ToLogin(seen_at(request))
     check_role(who, role)
     return who
 
@@ -140,11 +141,6 @@ class ToLogin(Exception):
     def __init__(self, path: str) -> None:
         super().__init__(path)
         self.path = path
-
-
-def local(path: str) -> str:
-    """A path of this service, whatever was asked for."""
-    return path if path.startswith("/") and not path.startswith(("//", "/\\")) else "/"
 
 
 def go(path: str) -> RedirectResponse:

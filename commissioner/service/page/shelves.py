@@ -9,10 +9,12 @@ from fastapi import APIRouter, File, Form, Request
 from fastapi.responses import Response
 from pydantic import ValidationError
 
+from commissioner.report.run.standing import Standing
 from commissioner.service.access.accounts import Role
+from commissioner.service.access.pages import local
 from commissioner.service.access.visitors import COOKIE, check_token, parts_of
 from commissioner.service.page.band import Place
-from commissioner.service.page.frame import View, enter, enter_form, go, local, refused, remember, render
+from commissioner.service.page.frame import View, enter, enter_form, go, refused, remember, render
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.access import Credentials, log_in, log_out, set_cookie
 from commissioner.service.routes.history import compared, trend_of
@@ -39,8 +41,9 @@ async def archive(request: Request, motor: str = "", outcome: str = "", since: s
     )
     live = {run.id for run in parts.desk.without_result()}
     return render(
-        request, ARCHIVE, found=found, live=live, motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit
-    )
+        request, ARCHIVE, found=found, live=live, motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit,
+        standings=list(Standing),
+    )  # fmt: skip
 
 
 @router.get("/compare")

@@ -43,9 +43,11 @@ def call_of(drive: Drive, motor: Motor) -> str:
 
 
 @router.get("/drives/{drive}/tune")
-async def tune(request: Request, drive: str, motor: str) -> Response:
+async def tune(request: Request, drive: str, motor: str = "") -> Response:
     """What the drive will do by itself; then the button to hold."""
     enter(request, Role.OPERATOR)
+    if not motor:
+        return go(f"/drives/{drive}")
     parts = parts_of(request)
     return _tune_page(request, parts.library.drive(drive), parts.library.motor(motor))
 

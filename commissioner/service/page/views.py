@@ -8,9 +8,10 @@ from fastapi import APIRouter, FastAPI, Request
 from fastapi.responses import RedirectResponse, Response
 
 from commissioner.errors import CommissionerError
+from commissioner.service.access.pages import came_from, seen_at
 from commissioner.service.access.visitors import visitor_of
 from commissioner.service.page import shelves, tuning, work
-from commissioner.service.page.frame import ToLogin, local, refused
+from commissioner.service.page.frame import ToLogin, refused
 from commissioner.service.page.texts import texts_of, told
 from commissioner.service.problems import Refusal, disk_refuses, refusal_of, respond
 
@@ -47,8 +48,8 @@ def answer(request: Request, refusal: Refusal) -> Response:
         return respond(refusal)
     if not wants_page:
         return respond(told(refusal, texts_of(request)))
+    if refusal.problem.status == 405 and request.method == "GET":
+        return RedirectResponse(request.url.path.rpartition("/")[0] or "/", 303)  # a form's address, looked at
     if refusal.problem.status == 401 or visitor_of(request).role is None:
-        return RedirectResponse("/login", 303)
-    return refused(
-        request, refusal, back=local(request.headers.get("referer", "/").partition("://")[2].partition("/")[2] or "/")
-    )
+        return RedirectResponse(f"/login?next={quote(seen_at(request))}", 303)
+    return refused(request, refusal, back=came_from(request))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
@@ -13,6 +15,8 @@ from fastapi.responses import JSONResponse, Response
 from jinja2 import UndefinedError
 from pydantic import ValidationError
 
+from commissioner.errors import CommissionerError
+from commissioner.report.run.standing import Held
 from commissioner.report.sheet.marks import capitalised
 from commissioner.report.sheet.words import typeset
 from commissioner.run.archive.documents import damaged, identified, origin_of
@@ -33,7 +37,7 @@ from commissioner.service.problems import Refusal
 from commissioner.service.routes.checks import make_checks
 from commissioner.service.routes.library import start_simulator
 from commissioner.service.routes.runs import RunWish, start_run
-from commissioner.service.routes.write import Act, act, drive_of, plan
+from commissioner.service.routes.write import Act, act, plan
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.feed import whole
 from commissioner.service.runs.live import live_document
@@ -53,6 +57,8 @@ DONE = replace(RESULT, step=8)
 WRITE = View("work/write.html", "What would be written into the drive", 7)
 JOURNALLED: Mapping[Act, str] = {"write-back": "parameters_written", "restore": "snapshot_restored"}
 """Records of a run's journal that say what was written into its drive."""
+LEFT: Mapping[Act, Held] = {"write-back": Held.NEW, "restore": Held.RESTORED}
+"""What the drive holds after each."""
 WRITTEN = View("work/written.html", "Written, read back and stored", 8)
 
 
@@ -64,14 +70,14 @@ async def start(request: Request) -> Response:
     drives = [drive for drive in parts.library.drives() if drive.id != SIMULATOR]
     newest = await asyncio.to_thread(lambda: parts.archive.entries(limit=8))
     live = parts.desk.without_result()
-    cut = [entry for entry in newest if entry.outcome == "cut off" and entry.run not in {run.id for run in live}]
+    open_ends = await asyncio.to_thread(parts.archive.open_ends)
     return render(
         request,
         START,
         drives=drives,
         newest=newest,
         live=live,
-        cut=cut,
+        open_ends=[entry for entry in open_ends if entry.run not in {run.id for run in parts.desk.live()}],
         scenarios=SCENARIOS,
         profiles=parts.library.profiles(),
         scenario=parts.simulator.scenario,
@@ -257,10 +263,12 @@ async def check_again(request: Request, drive: str) -> Response:
 
 
 @router.get("/drives/{drive}/checks")
-async def checks(request: Request, drive: str, motor: str) -> Response:
+async def checks(request: Request, drive: str, motor: str = "") -> Response:
     """What was seen, with the time; exceptions first."""
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
+    if not motor:
+        return go(f"/drives/{drive}")
     known, chosen = parts.library.drive(drive), parts.library.motor(motor)
     document = parts.checks.get(f"{known.id} {chosen.id}")
     if document is None:
@@ -278,10 +286,12 @@ async def checks(request: Request, drive: str, motor: str) -> Response:
 
 
 @router.get("/drives/{drive}/energise")
-async def energise(request: Request, drive: str, motor: str) -> Response:
+async def energise(request: Request, drive: str, motor: str = "") -> Response:
     """What will happen to the motor, in volts, amperes and seconds; then the button to hold."""
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
+    if not motor:
+        return go(f"/drives/{drive}")
     return _energise_page(request, parts.library.drive(drive), parts.library.motor(motor))
 
 
@@ -342,6 +352,7 @@ async def run(request: Request, run: str) -> Response:
         "is_diagnosing": not is_over,
         "losses": await asyncio.to_thread(losses_at_sight, entry.folder) if is_over else (),
         "has_report": (entry.folder / "report.html").is_file(),
+        "later": await asyncio.to_thread(parts.archive.written_later, entry),
     }
     try:
         return _ended_page(request, place, facts)
@@ -354,8 +365,7 @@ def _ended_page(request: Request, place: Place, facts: Mapping[str, Any]) -> Res
     if (result.get("tune") or {}).get("rows"):
         return tuned_page(request, place, **facts)
     if identified(result) is not None and entry.outcome in ("commissioned", "rejected"):
-        is_written = entry.standing == "commissioned"
-        return render(request, DONE if is_written else RESULT, place, **facts)
+        return render(request, DONE if entry.standing.is_written else RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
 
 
@@ -388,7 +398,7 @@ async def _table(request: Request, run: str, what: Act) -> Response:
     enter(request, Role.OPERATOR)
     parts = parts_of(request)
     place = _place(parts, run)
-    if what == "write-back" and parts.archive.find(run).standing == "commissioned":
+    if what == "write-back" and parts.archive.find(run).standing.is_written:
         return go(f"/runs/{run}/{what}/done")
     try:
         table = await plan(parts, run, what)
@@ -413,7 +423,8 @@ async def written(request: Request, run: str, what: Act) -> Response:
     """What was written last, as the run's journal has it: looked at again, nothing is written again."""
     enter(request)
     parts = parts_of(request)
-    lines = await asyncio.to_thread(read_journal, parts.archive.find(run).folder / "journal.jsonl")
+    entry = parts.archive.find(run)
+    lines = await asyncio.to_thread(read_journal, entry.folder / "journal.jsonl")
     done = next((line for line in reversed(lines) if line["kind"] == JOURNALLED[what]), None)
     if done is None:
         return go(f"/runs/{run}")
@@ -424,17 +435,21 @@ async def written(request: Request, run: str, what: Act) -> Response:
         run=run,
         what=what,
         done=done["record"],
-        units=_units(drive_of(parts, run)),
+        units=await asyncio.to_thread(_units, parts, run),
         written_utc=done["utc"],
+        since="" if entry.held is LEFT[what] else entry.written,
+        later=await asyncio.to_thread(parts.archive.written_later, entry),
         motor=str(origin_of(parts.archive.request(run)).get("motor", "")),
     )
 
 
-def _units(drive: Drive | None) -> dict[str, str]:
-    """Of the drive's items, in the signs of a page."""
-    from commissioner.link.files.drive_file import load_profile
+def _units(parts: Parts, run: str) -> dict[str, str]:
+    """Of the drive's items by the drive file as the run had it, in the signs of a page; empty where none is kept."""
+    from commissioner.operations.write import RunRequest, items_of  # late: numpy
 
-    items = load_profile(drive.profile).items if drive is not None else {}
+    items: Mapping[str, Any] = {}
+    with contextlib.suppress(CommissionerError):
+        items = items_of(RunRequest(parts.archive.root, run))
     return {name: UNIT_SIGNS.get(item.unit, item.unit) for name, item in items.items()}
 
 
@@ -442,9 +457,13 @@ def _place(parts: Parts, run: str) -> Place:
     return Place(run=run, drive=str(origin_of(parts.archive.request(run)).get("drive", "")))
 
 
+_SPELT = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae", "ł": "l"})
+
+
 def _slug(name: str, taken: set[str]) -> str:
     """An id from a name that a person gave, not taken yet."""
-    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:30] or "motor"
+    spelt = unicodedata.normalize("NFKD", name.lower().translate(_SPELT)).encode("ascii", "ignore").decode("ascii")
+    plain = re.sub(r"[^a-z0-9]+", "_", spelt).strip("_")[:30].strip("_") or "motor"
     return next(one for one in (plain, *(f"{plain}_{k}" for k in range(2, 1000))) if one not in taken)
 
 

@@ -17,6 +17,7 @@ from starlette.requests import ClientDisconnect, HTTPConnection
 
 from commissioner.encoding import JsonObject, read_json
 from commissioner.service.access.accounts import Role
+from commissioner.service.access.pages import came_from
 from commissioner.service.access.visitors import Operator, Visitor, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import ControlDocument
@@ -28,7 +29,6 @@ from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.feed import Feed, Message
-from commissioner.text import split_address
 
 router = APIRouter(route_class=Typed)
 BAND_S, BAND_BESIDE_NUMBERS_S = 0.4, 0.8
@@ -129,8 +129,7 @@ async def stop_everything(request: Request, why: Why) -> StopsDocument:
 async def stop_by_form(request: Request, target: Target) -> Response:
     """The same from a page without script; back to where it came from."""
     await stop_runs(request, "", "form", *target)
-    back = split_address(request.headers.get("referer", "/")).path or "/"
-    return RedirectResponse(back if back.startswith("/") and not back.startswith("//") else "/", 303)
+    return RedirectResponse(came_from(request), 303)
 
 
 def _check_confirmed(stopped: list[Stopped]) -> None:

@@ -10,10 +10,11 @@ from fastapi import APIRouter, Query, Request
 
 from commissioner.errors import CommissionerError
 from commissioner.identify.contract import Measured
+from commissioner.run.archive.catalogue import DATED_AHEAD, is_ahead
 from commissioner.service.access.visitors import Viewer, parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed
-from commissioner.service.contract.history import ComparedDocument, TrendChange, TrendDocument, TrendPoint
+from commissioner.service.contract.history import ComparedDocument, LeftOut, TrendChange, TrendDocument, TrendPoint
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask_for
@@ -63,9 +64,11 @@ def trend_of(parts: Parts, motor: str) -> TrendDocument:
     runs = [e for e in parts.archive.entries(motor=motor, limit=1000) if motor in e.motor_names]
     if not runs:
         parts.library.motor(motor)
-    entries = [e for e in runs if e.outcome == "commissioned"]
+    entries = [e for e in runs if e.outcome == "commissioned" and not is_ahead(e.utc)]
+    left_out: list[LeftOut] = [{"run": e.run, "why": DATED_AHEAD} for e in runs if is_ahead(e.utc)]
     points = [_point(entry, entry.parameters) for entry in reversed(entries) if entry.parameters]
-    return {"motor": motor, "points": points, "changes": _changes(parts, points) if len(points) > 1 else {}}
+    changes = _changes(parts, points) if len(points) > 1 else {}
+    return {"motor": motor, "points": points, "changes": changes, "left_out": left_out}
 
 
 def _point(entry: Entry, parameters: Mapping[str, Measured]) -> TrendPoint:

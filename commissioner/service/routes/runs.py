@@ -101,7 +101,7 @@ async def report(request: Request, run: str, _who: Viewer) -> Response:
     """The report as one HTML file; made again where the run could not make it."""
     parts = parts_of(request)
     entry = parts.archive.find(run)
-    if not (entry.folder / "report.html").is_file():
+    if entry.lacks_result or not (entry.folder / "report.html").is_file():
         arguments = ["runs", "report", entry.run, "--runs", str(parts.archive.root), "--json"]
         await ask_for("report", arguments, parts.desk.log("report"))
     return FileResponse(
@@ -150,7 +150,7 @@ def _row(entry: Entry) -> RunRow:
         "drive": entry.drive,
         "person": entry.person,
         "outcome": entry.outcome,
-        "standing": entry.standing,
+        "standing": entry.standing.value,
         "reason": entry.reason,
         "energised_s": entry.energised_s,
         "holds": entry.written,

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from commissioner.run.archive.documents import origin_of
+from commissioner.run.archive.journal import read_journal
+from commissioner.run.archive.summary import lacks_result
 from commissioner.run.holding.drive_lock import runs_holding
 from commissioner.run.stopping.operator_stop import SERVICE
 from commissioner.run.stopping.stop_file import ask_to_stop
@@ -19,7 +21,7 @@ from commissioner.service.configuration import Settings
 from commissioner.service.contract.runs import Stopped
 from commissioner.service.library import STANDARD, Drive, Library, Motor, Procedure
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.child import Child
+from commissioner.service.runs.child import Child, ask_for
 from commissioner.service.runs.control import Control, Pages, Party
 from commissioner.service.runs.feed import Feed
 from commissioner.service.runs.others import drive_at, going_on, is_copied, request_of
@@ -177,6 +179,7 @@ class Desk:
         self._free_drive(run)
         await asyncio.to_thread(self._write_end, run)
         run.feed.close()
+        await self._make_result(run)
 
     def _has_gone(self, run: LiveRun, waiting: asyncio.Task[None] | None) -> bool:
         if waiting is not None:
@@ -208,6 +211,20 @@ class Desk:
         outcome = end["outcome"] if end else "cut off"
         with contextlib.suppress(OSError):
             self.audit.write(SERVICE, "", f"run ended: {outcome}", run=run.id)
+
+    async def _make_result(self, run: LiveRun) -> None:
+        """Of a child that was killed between its end and what came of it: from its samples, as a person would ask for it."""
+        with contextlib.suppress(Refusal, OSError):  # then the run's page offers it
+            if (
+                run.child is not None
+                and not self.is_closing
+                and await asyncio.to_thread(_has_lost_result, run.feed.folder)
+            ):
+                await ask_for(
+                    "report",
+                    ["runs", "report", run.id, "--runs", str(self.settings.runs), "--json"],
+                    self.log("report"),
+                )
 
     # --- stopping -----------------------------------------------------------------------------------------------
     async def stop(self, run: LiveRun, person: str, reason: str) -> Stopped:
@@ -284,6 +301,10 @@ class Desk:
             await asyncio.wait(followers, timeout=10.0)
         for watch in self._watches.values():
             watch.close()
+
+
+def _has_lost_result(folder: Path) -> bool:
+    return lacks_result(folder, read_journal(folder / "journal.jsonl"))
 
 
 def _is_off(run: LiveRun) -> bool:

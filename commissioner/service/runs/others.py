@@ -9,7 +9,7 @@ from pathlib import Path
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError
-from commissioner.run.archive.catalogue import age
+from commissioner.run.archive.catalogue import by_age
 from commissioner.run.archive.summary import read_file
 from commissioner.service.library import Drive, Library
 
@@ -24,7 +24,7 @@ def going_on(runs: Path, holding: frozenset[str]) -> list[Path]:
     """Folders of the archive whose run has its drive (`holding`), and of those whose journal was written to just now."""
     if not runs.is_dir():
         return []
-    names, now = sorted((path.name for path in runs.iterdir()), key=age, reverse=True), time.time()
+    names, now = sorted((path.name for path in runs.iterdir()), key=by_age(), reverse=True), time.time()
     found = [runs / name for name in names if name in holding]
     for name in (name for name in names[:NEWEST] if name not in holding):
         with contextlib.suppress(OSError):

@@ -145,6 +145,17 @@ def test_a_write_back_is_taken_back_from_a_drive_that_shows_it_late(name):
     assert drive.truth()["held"] == before
 
 
+@pytest.mark.parametrize(("late_s", "outcome"), [(0.3, "commissioned"), (0.8, "rejected")])
+def test_a_kind_of_tuning_that_shows_late_is_waited_for_as_a_write_back_is_and_never_assumed(late_s, outcome, tmp_path):
+    """The file grants 0.5 s; the digit beside the kind asked for turns the shaft."""
+    tried = bench.try_tune(
+        "schneider_atv340", tmp_path, habits=Habits(late_s=late_s), repeat=1, pause_s=0.0, write_back=False
+    )
+    assert tried.done.ended.outcome == outcome and tried.truth["held"]["tune_kind"] == tried.before["tune_kind"]
+    assert len(tried.drive.tunings) == (outcome == "commissioned")
+    assert outcome == "commissioned" or "did not take 2 as tune kind" in tried.done.ended.reason
+
+
 def test_a_disk_that_fills_up_while_a_tune_brings_the_old_values_back_is_not_told_as_done(tmp_path, monkeypatch):
     journal = RunFolder.journal
 

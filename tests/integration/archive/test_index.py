@@ -11,13 +11,16 @@ import pytest
 
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.operations.archive import verify_runs
-from commissioner.run.archive.catalogue import find_folder, read_runs
+from commissioner.operations.history.runs import Archive
+from commissioner.operations.history.trend import trend
+from commissioner.run.archive import catalogue
+from commissioner.run.archive.catalogue import DATED_AHEAD, find_folder, read_runs
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.index import index
 from commissioner.run.index.index import ARCHIVE, find, note, refresh
 from commissioner.run.index.rows import CREATE, Row, Wanted
 from commissioner.run.index.store import NAME, check_url
-from tests.support.archive.synthetic import make_archive, make_run
+from tests.support.archive.synthetic import MACHINE, make_archive, make_run, result_of
 
 
 @pytest.fixture
@@ -101,6 +104,20 @@ def test_a_folder_that_somebody_called_otherwise_is_never_the_newest(tmp_path, d
     assert by_folders(tmp_path / "runs")[:2] == newest
 
 
+def test_a_run_of_a_clock_that_was_ahead_is_not_the_newest_for_ever(tmp_path, database, monkeypatch):
+    """`last` was that run until its time came, and a drive that it left in the middle was settled by it."""
+    runs, ahead, made = tmp_path / "runs", "20990101-060000-simulated-000abc", "20260102-060000-simulated-000abc"
+    for name in (ahead, "20260101-060000-simulated-000abc", made):
+        make_run(runs, name, result=result_of(name, MACHINE), origin={"motor_tag": "PUMP-7"})
+    assert names(find(runs, Wanted(), database))[0] == made == find_folder(runs, "last").name == by_folders(runs)[0]
+    assert names(find(runs, Wanted(), database)) == by_folders(runs)
+    found = trend(Archive(runs, database), "PUMP-7")
+    assert [point.run for point in found.found.trends[0].points] == ["20260101-060000-simulated-000abc", made]
+    assert found.left_out == (f"{ahead}: {DATED_AHEAD}",)
+    monkeypatch.setattr(catalogue, "names_until", lambda: "21000101-000000~")  # its time has come
+    assert find_folder(runs, "last").name == ahead
+
+
 def test_a_limit_tells_how_many_there_are(root, database):
     found = find(root, Wanted(limit=7), database)
     assert len(found.rows) == 7 and found.total == 40
@@ -109,9 +126,9 @@ def test_a_limit_tells_how_many_there_are(root, database):
 def test_folders_that_come_go_and_change_are_seen_at_the_next_list(root, database):
     refresh(root, database)
     shutil.rmtree(root / by_folders(root)[3])
-    make_run(root, "20990101-000000-simulated-bbbbbb", closed=False)
+    make_run(root, "20260101-000000-simulated-bbbbbb", closed=False)
     assert told(root, database) == by_folders(root)
-    folder = RunFolder(root / "20990101-000000-simulated-bbbbbb")
+    folder = RunFolder(root / "20260101-000000-simulated-bbbbbb")
     folder.journal("about_to", {"action": "stage"})
     (newest, *_) = find(root, Wanted(), database).rows
     assert (newest.outcome, newest.holds) == ("cut off", "old or new")  # a kill here would leave it so

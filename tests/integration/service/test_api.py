@@ -162,7 +162,7 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
 
 def test_a_run_compares_with_another_and_not_with_itself(service, finished):
     is_problem(service.client.get("/api/compare", params={"a": finished, "b": finished}), 422)
-    second = "20991231-235959-simulated"  # the same values, found again later
+    second = f"{finished}-2"  # the same values, found again later
     service.add_copy(finished, second)
     compared = service.client.get("/api/compare", params={"a": second, "b": finished}).json()
     assert (compared["before"], compared["after"]) == (finished, second)

@@ -8,12 +8,11 @@ import pytest
 from commissioner.cli.screens import screen
 from commissioner.cli.verbs.archived import runs, verify
 from commissioner.errors import DataRefused
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
+from commissioner.report.run.standing import Standing
 from commissioner.run import write_accepted
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.replay import apart
-from commissioner.run.archive.summary import STANDINGS
 from commissioner.text import counted, did_you_mean
 from tests.support.archive.killed import die
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
@@ -88,15 +87,19 @@ def test_what_a_run_is_shown_as_follows_what_was_written_since(tmp_path, last):
     """A write-back that was killed stood there as `commissioned`, and beside it that the drive still holds its old values."""
     name = "20260101-000000-simulated-abcdef"
     folder = make_run(tmp_path, name, result=result_of(name, MACHINE))
-    assert find_run(tmp_path, "last").standing == ACCEPTED
+    assert find_run(tmp_path, "last").standing == Standing.ACCEPTED
     writing = RunFolder(folder)
     writing.journal("about_to", {"action": "commit", "values": {}}, durable=True)
     if last != "about_to":
         writing.journal(last, {"is_stored": True}, durable=True)
     die(writing)
     run = find_run(tmp_path, "last")
-    wanted = {"about_to": UNSURE, "parameters_written": "commissioned", "snapshot_restored": RESTORED_SINCE}
-    assert run.standing == wanted[last] and wanted[last] in STANDINGS
+    wanted = {
+        "about_to": Standing.UNSURE,
+        "parameters_written": "commissioned",
+        "snapshot_restored": Standing.RESTORED_SINCE,
+    }
+    assert run.standing == wanted[last] and wanted[last] in list(Standing)
     with screen.out.capture() as shown:
         runs.show_run(tmp_path, "last", as_json=False)
     assert "still holds its old values" not in shown.get()

@@ -21,6 +21,7 @@ from commissioner.operations.history.runs import Wanted, find_runs, index_runs, 
 from commissioner.procedure.steps import Findings
 from commissioner.recordings.table import read_table, to_standstill, write_table
 from commissioner.records import SampleBlock
+from commissioner.report.run.standing import Standing
 from commissioner.run.archive import report
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_run
@@ -28,7 +29,7 @@ from commissioner.run.archive.folder import RunFolder, write_recording
 from commissioner.run.archive.follow import JournalFollower
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.seal import read_key
-from commissioner.run.archive.summary import summarise
+from commissioner.run.archive.summary import NO_RESULT, summarise
 from commissioner.run.archive.verify import verify
 from commissioner.service.archive import Archive
 from commissioner.service.runs.others import request_of
@@ -160,6 +161,11 @@ def intent(action):
         ([("about_to", intent("store")), ("parameters_written", {}), ("about_to", intent("stage"))], "old or new"),
         ([("parameters_written", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
         (
+            [("about_to", intent("tune")), ("snapshot_restored", {}), ("run_ended", {})],
+            "as before, read back",
+        ),  # by itself
+        ([("run_ended", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
+        (
             [("parameters_written", {"store_count_after": 18, "endurance_writes": 100000})],
             "new, read back and stored; 18 of 100000 writes",
         ),
@@ -252,6 +258,14 @@ def test_a_list_says_that_a_run_which_was_cut_off_had_written(folder):
     assert (summarise(folder.path).outcome, summarise(folder.path).holds) == ("cut off", "new")
     folder.journal("run_ended", {"outcome": "commissioned"})
     assert summarise(folder.path).holds == ""
+
+
+def test_a_result_that_is_still_to_be_kept_is_not_told_as_lost(folder):
+    """A list that looks while the run writes its result."""
+    folder.journal("run_ended", {"outcome": "commissioned", "reason": "good"})
+    assert (summarise(folder.path).standing, summarise(folder.path).reason) == (Standing.ACCEPTED, "good")
+    die(folder)
+    assert summarise(folder.path).standing is Standing.NOT_KEPT and NO_RESULT in summarise(folder.path).reason
 
 
 def test_whoever_shows_an_edited_run_says_so(tmp_path, capsys):

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commissioner.cli.screens import screen
+from commissioner.cli.verbs.archived import deciding
 from commissioner.cli.verbs.archived.deciding import restore_run
 from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError, WriteBackFailed
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
-from commissioner.records import SampleBlock
+from commissioner.records import SampleBlock, plain_name
 from commissioner.run import restore as restoring
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.folder import RunFolder
@@ -69,6 +71,18 @@ def bench(tmp_path, monkeypatch):
     bench = Bench(tmp_path, monkeypatch)
     yield bench
     bench.folder.close()
+
+
+def test_what_is_restored_is_told_with_register_unit_and_convention_as_the_table_that_was_agreed_to(bench):
+    bench.write()
+    die(bench.folder)
+    with screen.out.capture() as shown:
+        deciding.restore_run(bench.folder.path.parent, bench.folder.path.name, None, yes=True, as_json=False)
+    said = set(shown.get().split())
+    for name, value in bench.snapshot.in_use.items():
+        item = PROFILE.item(name)
+        assert {str(item.place), item.unit, f"{value:.6g}", *plain_name(name).split()} <= said
+    assert {"register", "unit", "convention"} <= said
 
 
 def test_what_the_run_wrote_is_taken_back(bench):

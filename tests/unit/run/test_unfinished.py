@@ -8,9 +8,10 @@ import pytest
 
 from commissioner.procedure.findings import LeftUnfinished
 from commissioner.records import DriveIdentity
+from commissioner.report.run.standing import Held
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
-from commissioner.run.holding.unfinished import left_unfinished
+from commissioner.run.holding.unfinished import Word, left_by, left_unfinished
 from tests.campaigns.tunings.bench import try_tune
 from tests.support.archive.killed import die
 from tests.support.archive.synthetic import make_run
@@ -55,6 +56,24 @@ def test_a_run_that_wrote_nothing_hides_it_not_and_one_that_wrote_ends_it(cut_of
 def test_restored_it_is_over(cut_off, tmp_path):
     journalled(cut_off, ("snapshot_restored", {}))
     assert left_unfinished(tmp_path, URL, OURS) is None
+
+
+AHEAD_UTC = "2099-01-01T00:00:00+00:00"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([Word("a", Held.OLD_OR_NEW, "2026-01-02"), Word("b", Held.NEW, "2026-01-01")], "a"),
+        ([Word("a", Held.OLD_OR_NEW, "2026-01-01"), Word("b", Held.NEW, "2026-01-02")], ""),
+        ([Word("b", Held.OLD_OR_NEW, "2026-01-02"), Word("a", Held.RESTORED, "2026-01-03")], ""),  # an older run's set
+        ([Word("a", Held.OLD_OR_NEW, "2026-01-02"), Word("b", Held.AS_BEFORE, "2026-01-03")], "a"),
+        ([Word("a", Held.OLD_OR_NEW, "2026-01-02"), Word("b", Held.NEW, AHEAD_UTC)], "a"),
+        ([Word("a", Held.OLD_OR_NEW, AHEAD_UTC), Word("b", Held.NEW, "2026-01-02")], "a"),
+    ],
+)
+def test_whoever_wrote_last_settles_it_by_a_clock_that_can_be_right(words, told):
+    assert left_by(words) == left_by(reversed(words)) == told
 
 
 def test_the_next_tune_of_a_drive_without_a_number_says_so_in_journal_and_result(tmp_path):

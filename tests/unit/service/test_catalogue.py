@@ -26,7 +26,7 @@ PAGE = PRODUCT / "service" / "page"
 SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py", "run/inspection.py",
         "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py", "service/library.py", "service/recordings.py", "service/simulator.py", "operations/history/runs.py", "run/ending.py", "run/archive/documents.py", "run/write_accepted.py", "run/restore.py", "run/holding", "run/tuning",
-        "link/drive", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
+        "link/drive", "identify/inverter", "identify/batch", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
 FACTS = ("what", "title", "remedy")
 NOT_SHOWN = re.compile(

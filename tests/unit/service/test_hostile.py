@@ -33,6 +33,58 @@ def test_json_that_is_none_of_ours_is_a_problem_document(client, body):
     assert answer.json()["limit"] and answer.json()["remedy"]
 
 
+@pytest.mark.parametrize("path", ["/", "/runs", "/api/health", "/api/runs", "/api/runs/none", "/static/js/page.js"])
+def test_head_is_what_get_would_answer_without_its_body(client, path):
+    """It was refused, and of two routes with one path the answer named the other's method alone."""
+    asked, headed = client.get(path), client.head(path)
+    assert (headed.status_code, headed.content) == (asked.status_code, b"")
+    assert headed.headers["content-type"] == asked.headers["content-type"]
+
+
+@pytest.mark.parametrize(
+    ("path", "takes"),
+    [
+        ("/api/runs", "GET, POST, HEAD"),
+        ("/api/stop", "POST"),
+        ("/api/accounts/x", "DELETE"),
+        ("/api/runs/x/restore", "GET, POST, HEAD"),
+    ],
+)
+def test_a_method_that_is_not_offered_is_told_with_all_that_are(client, path, takes):
+    for method in ("PATCH", "OPTIONS"):
+        answer = client.request(method, path)
+        assert (answer.status_code, answer.headers["allow"]) == (405, takes)
+        assert answer.headers["content-type"] == "application/problem+json"
+
+
+PAGE = {"accept": "text/html"}
+
+
+@pytest.mark.parametrize(
+    ("form", "page"), [("/drives", "/"), ("/drives/simulator/motor", "/drives/simulator"), ("/plate", "/"), ("/recordings", "/"),
+                       ("/drives/simulator/checks", "/drives/simulator"), ("/drives/simulator/energise", "/drives/simulator")],
+)  # fmt: skip
+def test_the_address_of_a_form_leads_to_its_page(client, form, page):
+    """A browser stands there after a refusal: language, STOP or a reload led to `this method is not offered here`."""
+    answer = client.get(form, headers=PAGE, follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (303, page)
+
+
+def test_a_refused_page_leads_back_to_where_the_browser_was(client):
+    here = "http://127.0.0.1/runs?outcome=aborted"
+    for method in ("GET", "POST"):
+        said = client.request(
+            method, "/compare" if method == "GET" else "/drives", headers=PAGE | {"referer": here}
+        ).text
+        assert 'href="/runs?outcome=aborted">Back' in said or method == "GET"
+    assert 'name="back" value="/runs?outcome=aborted"' in said  # the language is changed there, not at the form
+    assert (
+        client.post("/stop", headers={"referer": here}, follow_redirects=False).headers["location"]
+        == "/runs?outcome=aborted"
+    )
+    assert client.post("/stop", headers={"referer": "http://evil/x"}, follow_redirects=False).headers["location"] == "/"
+
+
 def test_an_address_that_is_none_is_another_sites(client):
     assert client.post("/api/stop", headers={"origin": "http://["}).status_code == 403
     assert client.post("/stop", headers={"referer": "http://["}, follow_redirects=False).headers["location"] == "/"

@@ -84,6 +84,86 @@ def test_a_run_whose_write_back_was_killed_is_not_told_as_written(tmp_path: Path
     assert "commissioned, old or new" in client.get("/runs").text
 
 
+def said_at_the_start(root: Path) -> str:
+    """What a run has left to look after, as the start page has it."""
+    client = TestClient(create_app(make_parts(Settings(root / "runs", root / "data"))), base_url="http://127.0.0.1")
+    return (
+        client.get("/", headers={"accept": "text/html"}).text.partition('<div class="cols3">')[0].partition("<h1>")[2]
+    )
+
+
+@pytest.mark.parametrize("has_ended", [True, False])
+def test_the_start_page_says_what_a_write_that_did_not_end_has_left_now(tmp_path: Path, has_ended: bool) -> None:
+    """It told of the run for as long as that was among the newest, also when the drive was restored long since."""
+    run, later = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
+    folder = make_run(tmp_path / "runs", run, result=result_of(run, MACHINE), closed=has_ended)
+    for kind, record in (("about_to", {"action": "commit"}), ("snapshot_restored", {"is_stored": True})):
+        writing = RunFolder(folder)
+        writing.journal(kind, record, durable=True)
+        die(writing)
+        said = said_at_the_start(tmp_path)
+        if kind == "about_to":
+            assert ("was cut off" if not has_ended else f"of {run} did not end") in said and "old or new" in said
+        else:
+            assert "old or new" not in said and "What to do" not in said and "note caution" not in said
+            assert ("The drive has its old values again" in said) is not has_ended
+    make_run(tmp_path / "runs", later)
+    assert run not in said_at_the_start(tmp_path)
+
+
+def test_what_was_written_is_told_as_what_it_was_once_it_has_changed(tmp_path: Path) -> None:
+    """`The drive works with these values now` stood there after the restore, and after another run's write-back."""
+    run, later = "20240105-081500-simulated-000abc", "20240620-081500-simulated-001abc"
+    client = TestClient(
+        create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data"))), base_url="http://127.0.0.1"
+    )
+
+    def write(name: str, kind: str) -> None:
+        writing = RunFolder(tmp_path / "runs" / name)
+        writing.journal(kind, {"is_stored": True, "written": []}, durable=True)
+        die(writing)
+
+    def said(path: str) -> str:
+        return client.get(f"/runs/{run}{path}", headers={"accept": "text/html"}).text
+
+    for name in (run, later):
+        make_run(tmp_path / "runs", name, result=result_of(name, MACHINE))
+    write(run, "parameters_written")
+    assert "works with these values now" in said("/write-back/done") and "A later run" not in said("")
+    write(later, "parameters_written")
+    assert "works with these values now" not in said("/write-back/done")
+    assert "A later run has changed what the drive holds:" in said("") and f'href="/runs/{later}"' in said("")
+    write(run, "snapshot_restored")
+    assert "A later run" not in said("") and "Since then, parameters in the drive: as before (restored)" in said(
+        "/write-back/done"
+    )
+    assert "works with these values now" in said("/restore/done")
+
+
+def test_the_start_page_tells_of_a_run_that_was_cut_off_until_its_drive_was_met_again(tmp_path: Path) -> None:
+    cut, other, again = (f"2024010{n}-081500-simulated-000abc" for n in (1, 2, 3))
+    make_run(tmp_path / "runs", cut, closed=False)
+    make_run(tmp_path / "runs", other, drive=7)
+    assert cut in said_at_the_start(tmp_path)
+    make_run(tmp_path / "runs", again, outcome="aborted")
+    assert cut not in said_at_the_start(tmp_path)
+
+
+def test_the_page_of_a_run_whose_result_was_not_kept_says_so_and_offers_to_make_it(tmp_path: Path) -> None:
+    run = "20240105-081500-simulated-000abc"
+    (make_run(tmp_path / "runs", run) / "blocks.bin").write_bytes(b"x")
+    client = TestClient(
+        create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data"))), base_url="http://127.0.0.1"
+    )
+    said = client.get(f"/runs/{run}", headers={"accept": "text/html"}).text
+    assert (
+        "the process ended before its result was kept" in said and f'href="/runs/{run}/report">Make the result' in said
+    )
+    assert "commissioned, result not kept" in client.get("/runs", headers={"accept": "text/html"}).text
+    (row,) = client.get("/api/runs").json()["runs"]
+    assert (row["outcome"], row["standing"]) == ("commissioned", "commissioned, result not kept")
+
+
 def test_a_damaged_journal_ends_every_export_as_on_the_command_line(tmp_path: Path) -> None:
     run, runs = "20240105-081500-simulated-000abc", tmp_path / "runs"
     folder = make_run(runs, run, result=result_of(run, MACHINE))

@@ -14,10 +14,12 @@ from commissioner.link.files.drive_file import known_drives, load_profile
 from commissioner.procedure.checks import check_name
 from commissioner.procedure.states import ENDED, State
 from commissioner.procedure.tuned import FEWEST
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, UNSURE
+from commissioner.report.run.standing import Standing
 from commissioner.report.run.summary import diagnosis_sentences
 from commissioner.report.sheet.words import NBSP
 from commissioner.run.archive import summary
+from commissioner.run.archive.catalogue import DATED_AHEAD
+from commissioner.run.archive.summary import CAN_BE_MADE, NO_RESULT
 from commissioner.service.page.frame import environment, words_of
 from commissioner.service.page.texts import Texts, texts_of
 from commissioner.service.page.words import IN_THE_DRIVE, Words
@@ -64,7 +66,7 @@ def test_what_the_core_remarks_of_every_run_has_its_german():
     remarks = (
         LongerTest(8.0, (0.002,) * 4, (0.001,) * 4).sentence, LongerTest(8.0, (0.002,) * 4, (0.002,) * 4).sentence,
         TimeShift(0, 1.2e-5, 1e-7, 2e-4).sentence, *(cause.value for cause in Cause),
-        RESTORED_SINCE, ACCEPTED, UNSURE, "as before, read back", "no load current", "not identified",
+        *Standing, NO_RESULT, f"{NO_RESULT}{CAN_BE_MADE}", DATED_AHEAD, "as before, read back", "no load current", "not identified",
         "Schneider Altivar ATV320, serial number not known",
         "orientations: 2; sensor gain and anisotropy need at least three: what the phases or their sensors differ by is in the values, and "
         "not all of it in the intervals",
@@ -219,7 +221,7 @@ def test_why_the_service_stopped_a_run_is_told_in_german_and_a_persons_words_sta
 @pytest.mark.parametrize("facts", [{}, {"is_stored": False}, {"store_count_after": 3, "endurance_writes": 100000}, {"is_stored": False, "store_count_after": 3, "endurance_writes": 9}, {"values": {"stator_resistance": 3.2}}])  # fmt: skip
 def test_what_a_drive_holds_after_a_run_is_told_in_german(kind, facts):
     """Above all of a run that was cut off while it wrote."""
-    said = summary._written([{"kind": kind, "record": facts | {"action": "commit"}}])
+    said = summary._word(kind, facts | {"action": "commit"})
     german = Texts("de").tell(said)
     assert not set(re.findall(r"[a-z]{3,}", german)) & {
         "new",

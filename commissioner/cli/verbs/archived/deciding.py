@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
 from commissioner.operations import archive, closing, write
-from commissioner.records import drive_words, plain_name
+from commissioner.records import WrittenParameter, drive_words, plain_name
 from commissioner.run.archive.seal import read_key
 from commissioner.run.holding.priority import lower_priority
 from commissioner.run.write_accepted import Plan, as_document
@@ -39,16 +40,10 @@ def restore_run(
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
-    rows = [(plain_name(w.name), f"{w.before:.5g}", f"{w.after:.5g}", f"{w.read_back:.5g}") for w in done.written]
-    if rows:
-        screen.out.print(
-            screen.table(
-                "", ("parameter, as the drive counts it", "before", "written", "read back"), rows, right=(1, 2, 3)
-            )
-        )
+    _show_written(request, done.written)
     screen.out.print(
         f"[green]the values before the run are restored, {screen.kept(done.is_stored)}[/]"
-        if rows
+        if done.written
         else "the drive held the snapshot's values already"
     )
     if done.fault:
@@ -87,9 +82,24 @@ def write_run(
         reason = f"{counted(len(report.written), 'value')} written, {screen.kept(report.is_stored)}"
         screen.emit({"outcome": "written", "reason": reason} | vars(done))
         return
+    _show_written(request, report.written)
     screen.out.print(f"[green]{len(report.written)} parameters written, {screen.kept(report.is_stored)}[/]")
     if report.wear_fraction is not None and report.store_count_after is not None:
         screen.out.print(screen.wear(report.store_count_after, report.wear_fraction))
+
+
+def _show_written(request: write.RunRequest, written: Sequence[WrittenParameter]) -> None:
+    """What a drive holds now, as the table that was agreed to says it."""
+    if not written:
+        return
+    items = write.items_of(request)
+    rows = [
+        (str(w.register), plain_name(w.name), *(f"{value:.6g}" for value in (w.before, w.after, w.read_back)), items[w.name].unit,
+         plain_name(items[w.name].convention))
+        for w in written
+    ]  # fmt: skip
+    header = ("register", "parameter", "before", "written", "read back", "unit", "convention")
+    screen.out.print(screen.table("", header, rows, right=(2, 3, 4)))
 
 
 def _show_plan(plan: Plan, *, as_json: bool) -> None:

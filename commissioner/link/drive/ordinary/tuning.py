@@ -26,6 +26,7 @@ from commissioner.link.drive.items import Items, number
 from commissioner.link.drive.ordinary.insisting import ATTEMPTS, is_lost
 from commissioner.link.drive.ordinary.unlocking import unlocked
 from commissioner.link.drive.reading import read_status
+from commissioner.records import plain_name
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.status import DriveState
 from commissioner.registers.tuning import Step, Tuning
@@ -110,6 +111,13 @@ class _Awaited:
         )  # fmt: skip
 
 
+def _not_ready(step: Step, seen: int) -> CheckFailed:
+    return CheckFailed(
+        f"the drive is not ready to tune: {step.item} is {seen:#06x}", step="tune: expect", value=seen,
+        limit=f"{step.value:#06x}" + (f": {step.why}" if step.why else ""), remedy=step.why or "see the drive's manual",
+    )  # fmt: skip
+
+
 class Tuner:
     """Lets one drive tune itself, once a call."""
 
@@ -125,6 +133,8 @@ class Tuner:
     ) -> None:
         self._items, self._tuning, self._operator, self._journal = items, tuning, operator, journal
         self._sleep, self._clock = sleep, clock
+        self._shows_by_s: dict[str, float] = {}
+        """Until when each item that was written shows it."""
         self._before: int | None = None
         """The status that is awaited, as it stood before the start."""
         self._lost: LinkError | None = None
@@ -173,19 +183,33 @@ class Tuner:
             self._await(step)
 
     def _expect(self, step: Step) -> None:
-        seen = self._raw(step.item) & step.mask
-        if seen != step.value & step.mask:
-            raise CheckFailed(
-                f"the drive is not ready to tune: {step.item} is {seen:#06x}", step="tune: expect", value=seen,
-                limit=f"{step.value:#06x}" + (f": {step.why}" if step.why else ""), remedy=step.why or "see the drive's manual",
-            )  # fmt: skip
+        """What was written just now may show late, as in a write-back: it is waited for as long as the drive's file grants."""
+        end_s = self._shows_by_s.get(step.item, -math.inf)
+        while (seen := self._raw(step.item) & step.mask) != step.value & step.mask:
+            if self._clock() >= end_s:
+                raise self._not_taken(step, seen) if step.item in self._shows_by_s else _not_ready(step, seen)
+            self._sleep(step.every_s)
+
+    def _not_taken(self, step: Step, seen: int) -> CheckFailed:
+        """Of an item that was written before it was looked at."""
+        kind, called = self._tuning.facts.get("standstill"), plain_name(step.item)
+        is_kind = kind is not None and kind.item == step.item
+        return CheckFailed(
+            f"the drive did not take {step.value} as {called}, it shows {seen}; another kind of tuning may turn the shaft, so none was started"
+            if is_kind
+            else f"the drive did not take {step.value} as {called}, it shows {seen}; no tuning was started", step="tune: read back", value=seen, limit=step.value,
+            remedy=f"release the drive's parameter lock, or set {called} at its keypad; where it shows a new value late, give "
+            "parameters.settle_s in the drive file",
+        )  # fmt: skip
 
     def _write(self, step: Step, index: int) -> None:
         if step.once:
             self._note_status_before(index)
         item = self.profile.item(step.item)
+        settle_s = self.profile.parameters.settle_s if self.profile.parameters else 0.0
         try:
             self._items.port.write(item.address, [step.value])
+            self._shows_by_s[step.item] = self._clock() + settle_s
         except (ReplyTimeout, ReplyMismatch) as lost:
             if not step.once:
                 raise

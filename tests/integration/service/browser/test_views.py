@@ -18,12 +18,12 @@ HIT = "() => window.hit !== undefined || document.querySelector('img[src=x]') !=
 @pytest.fixture(scope="module")
 def shelf(service, finished):
     """Runs to look at: one that is good, a later copy, one that was stopped, one whose name and origin are hostile."""
-    copies = {"later": "20991231-235959-simulated", "evil": "20991231-235958-<img src=x onerror=window.hit=1>"}
+    copies = {"later": f"{finished}-2", "evil": f"{finished[:15]}-<img src=x onerror=window.hit=1>"}
     for name in copies.values():
         service.add_copy(finished, name)
     request = service.runs / copies["evil"] / "request.json"
     told = json.loads(request.read_text("utf-8"))
-    told["origin"] = {"person": EVIL, "by": EVIL, "drive": EVIL, "motor": EVIL}
+    told["origin"] = {"person": EVIL, "by": EVIL, "drive": EVIL, "motor": EVIL + 80 * "Ü"}
     request.write_text(json.dumps(told), encoding="utf-8")
     stopped = service.start_run()
     service.wait_energised(stopped)

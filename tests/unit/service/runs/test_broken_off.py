@@ -6,15 +6,18 @@ import asyncio
 import logging
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings
 from commissioner.service.parts import make_parts
+from commissioner.service.runs import desk
 from commissioner.service.runs.desk import Stopped
+from commissioner.service.runs.feed import Feed
 from commissioner.service.serving import MOST_RECORDS, _told_apart
+from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 HELD_S = 60.0
 
@@ -139,3 +142,23 @@ def test_a_console_that_takes_no_more_holds_up_nobody() -> None:
         may_go_on.set()
     assert logger.handlers == before
     assert told[0] == "line 0" and len(told) <= MOST_RECORDS + 1
+
+
+@pytest.mark.parametrize(("has_result", "is_ours", "asked"), [(False, True, 1), (True, True, 0), (False, False, 0)])
+def test_a_run_of_ours_that_was_killed_before_its_result_gets_it_without_being_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_result: bool, is_ours: bool, asked: int
+) -> None:
+    name = "20240105-081500-simulated-000abc"
+    folder = make_run(tmp_path / "runs", name, result=result_of(name, MACHINE) if has_result else None)
+    calls: list[list[str]] = []
+
+    async def ask_for(_wanted: str, arguments: list[str], _log: Path) -> dict[str, Any]:
+        calls.append(arguments)
+        return {}
+
+    monkeypatch.setattr(desk, "ask_for", ask_for)
+    parts = make_parts(Settings(tmp_path / "runs", tmp_path / "data"))
+    run = desk.LiveRun(name, "simulator", "pump", Feed(folder), None, cast("Any", object()) if is_ours else None)
+    asyncio.run(parts.desk._make_result(run))
+    run.feed.close()
+    assert [call[:3] for call in calls] == [["runs", "report", name]] * asked
