@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
 """A fit with unknown shaft grows with these: from all at once 20 of 60 ended in a wrong valley, so none of 60."""
+TURNS_S = 0.05
+"""From where on a prefix tells the shaft."""
 FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
 """What of the load is free in a prefix of this length: a fan is nothing before the shaft turns."""
 RUN_UP_LOAD = ("load_constant", "load_linear", "load_fan", "load_breakaway")
@@ -200,17 +202,30 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
     numbers: tuple[str, ...] = FOUR
     if record.has_start:
         numbers = (*FOUR, "inertia")
-        for seconds in PREFIXES_S:
-            if seconds < record.windows[0].time_s[-1]:
-                own = (
-                    FOUR if seconds < 0.05 else (*numbers, *(name for name, least in FREED_FROM_S if seconds >= least))
-                )
-                machine = _settled(problem.cut(seconds), machine, own)
+        machine = _grown(problem, machine)
     law = RUN_UP_LOAD if smooth_load or record.has_start else ()
     free = (*numbers, *law, *LOAD_RIPPLE)
     if record.has_start or record.plate.inertia_kg_m2:
         return refine(problem, machine, columns_of(free, record, machine, knots=not smooth_load))
     return _with_inertia(problem, machine, free, knots=not smooth_load)
+
+
+def _grown(problem: Problem, machine: Machine, beside: Sequence[str] = ()) -> Machine:
+    """Fitted to more and more of a start, with the numbers `beside` once the shaft turns."""
+    for seconds in PREFIXES_S:
+        if seconds < problem.record.windows[0].time_s[-1]:
+            turning = ("inertia", *beside, *(name for name, least in FREED_FROM_S if seconds >= least))
+            own = FOUR if seconds < TURNS_S else (*FOUR, *turning)
+            machine = _settled(problem.cut(seconds), machine, own)
+    return machine
+
+
+def grown_anew(problem: Problem, machine: Machine, beside: Sequence[str]) -> Machine:
+    """The machine whose load and inertia are sought once more, from its start on, with these numbers free beside the four."""
+    fresh = _free_to_turn([machine.value(name) for name in FOUR], problem.record)
+    none = dict.fromkeys((*RUN_UP_LOAD, *LOAD_RIPPLE), 0.0)
+    start = replace(machine, first=fresh.first, knots=np.zeros_like(machine.knots))
+    return _grown(problem, start.with_values({**none, "inertia": fresh.value("inertia")}), beside)
 
 
 def held_at_plate(problem: Problem, fit: Fit, names: Sequence[str]) -> Fit:

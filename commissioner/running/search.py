@@ -25,10 +25,14 @@ from commissioner.estimation.record import Record
 from commissioner.estimation.told import Slopes
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
-from commissioner.running.nominal import held_at_plate, nominal
+from commissioner.running.nominal import grown_anew, held_at_plate, nominal
 from commissioner.running.rules import RULES
 
 Array = NDArray[np.float64]
+
+
+MOST_ANEW = 30
+"""Steps of a law's shape, once its size is found anew."""
 
 
 @dataclass(frozen=True)
@@ -152,9 +156,11 @@ class Search:
         """The columns of a cause's numbers in this recording."""
         return numbers_of(numbers, self.problem.record)
 
-    def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
+    def fitted(
+        self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None, promised: float = 0.0
+    ) -> Fit:
         """With these causes free; `near` is a fit near by, whose sensitivities serve as long as they do. `first`: Jacobian for the first
-        step, without spare numbers then."""
+        step, without spare numbers then. `promised`: what the last cause is to gain beside `near`, else its way is sought anew."""
         if first is not None:
             own = [column for c in causes[-1:] for column in self.own(c.form.numbers)]
             before = self.columns(causes[:-1])
@@ -168,7 +174,24 @@ class Search:
         ]
         if new:
             rows[[j for j, c in enumerate(columns) if c not in place]] = jacobian(self.problem, start, new)
-        return refine(self.problem, start, columns, most=10, first_jacobian=rows, is_final=False)
+        fit = refine(self.problem, start, columns, most=10, first_jacobian=rows, is_final=False)
+        return self._found_anew(fit, causes, near) if near.chi2 - fit.chi2 < promised else fit
+
+    def _found_anew(self, fit: Fit, causes: Sequence[Named], near: Fit) -> Fit:
+        """The better of this fit and of one that grows with the start, the last of the causes free all along: a search that ends worse than without
+        it, or gains little of what a straight line tells, has lost its way along load and inertia of a run-up, and 50 steps do not lead it back."""
+        record = self.problem.record
+        if record.has_speed or not record.has_start or not {*near.columns} < {*fit.columns}:
+            return fit
+        *others, last = causes
+        start = self._inside(near.machine.with_values(dict.fromkeys(last.form.numbers, 0.0)), causes)
+        start = grown_anew(self.problem, start, last.form.numbers)
+        bare = (*self.columns(others), *self.own(last.form.numbers))
+        grown = refine(self.problem, start, bare, is_final=False)
+        if last.form.spare:
+            start = self._inside(grown.machine, causes)
+            grown = refine(self.problem, start, fit.columns, most=MOST_ANEW, is_final=False)
+        return min(fit, grown, key=lambda f: f.chi2)
 
     def _inside(self, machine: Machine, causes: Sequence[Named]) -> Machine:
         """A first step that left what a sign allows begins from little instead."""
@@ -375,7 +398,8 @@ def _tried(seeking: Search, held: Fit, fit: Fit, accepted: tuple[Named, ...]) ->
         if any(t.explains_all and t.cause.cause != one.cause for t in tried):
             continue  # whoever explains as much is told apart as its rival; another form of the same cause is not
         first = np.concatenate([fit.jacobian, own])
-        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
+        hoped = RULES.kept_promise * gain if gain > max((t.gain for t in tried), default=0.0) else 0.0
+        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first, promised=hoped)
         won = fit.chi2 - other.chi2
         tried.append(Tried(one, other, won, _refusal(seeking, held, fit, other, (*accepted, one), won)))
     return sorted(tried, key=lambda t: -t.worth)
