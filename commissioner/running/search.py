@@ -18,6 +18,7 @@ from commissioner.estimation.fit import (
     numbers_of,
     refine,
     refreshed,
+    with_knot_times,
 )
 from commissioner.estimation.noisy_input import chi2_by_own_noise, unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
@@ -25,7 +26,7 @@ from commissioner.estimation.record import Record
 from commissioner.estimation.told import Slopes
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
-from commissioner.running.nominal import grown_anew, held_at_plate, nominal
+from commissioner.running.nominal import NEAR, grown_anew, held_at_plate, nominal, with_load_changes
 from commissioner.running.rules import RULES
 
 Array = NDArray[np.float64]
@@ -242,6 +243,7 @@ def _found(seeking: Search) -> Found:
         fit, accepted = taken
         if round_ == 0:
             fit, accepted = _weighted(seeking, fit, accepted)
+        fit = _settled(seeking, fit, accepted)
         fit, accepted = _exchanged(seeking, fit, accepted)
     fit, accepted = _backward(seeking, fit, accepted)
     shown, fit, accepted = _shown(seeking, fit, accepted)
@@ -272,6 +274,25 @@ def _weighted(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[F
     for one in accepted:
         seeking.say(Step("dropped", one.cause, one.form.name, (seeking.base.chi2 - fit.chi2) / fit.scale, BEYOND))
     return seeking.base, ()
+
+
+def _settled(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> Fit:
+    """Where something is left without a speed: the fit to its end, sought anew from the start on, and both it and the plain one with knots where
+    the load changes: beside a cause that was not yet known nobody saw that, nor the valley that is the motor's."""
+    problem, record = seeking.problem, seeking.problem.record
+    if record.has_speed or fit.chi2 < RULES.nothing_left * fit.count:
+        return fit
+    denser = with_load_changes(problem, refine(problem, fit.machine, fit.columns))
+    if record.has_start and denser.chi2 > RULES.nothing_left * denser.count:
+        numbers = [n for c in accepted for n in c.form.numbers]
+        anew = refine(problem, grown_anew(problem, denser.machine, numbers), denser.columns)
+        denser = with_load_changes(problem, anew) if anew.chi2 < denser.chi2 else denser
+    if not seeking.is_plausible(denser, accepted):
+        return fit
+    times = denser.machine.knot_times_s
+    if times.shape != fit.machine.knot_times_s.shape or np.any(times != fit.machine.knot_times_s):
+        seeking.base = refine(problem, *with_knot_times(record, seeking.base, times), tolerance=NEAR)
+    return denser
 
 
 def _shown(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, Fit, tuple[Named, ...]]:
