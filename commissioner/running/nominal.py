@@ -150,14 +150,14 @@ def _with_denser_load(problem: Problem, fit: Fit, marks: Sequence[Bools], excess
 
 def _left_over(rest: Array, state: NDArray[np.int64], block: int) -> Bools:
     """Samples of the blocks after the run-up in which more is left than chance leaves."""
-    return np.asarray(_over_chance(rest, block) > 0.0) & (state != STATES.index("start"))
+    return np.asarray((_over_chance(rest, block) > 0.0) & (state != STATES.index("start")))
 
 
 def _left_within(rest: Array, state: NDArray[np.int64], block: int) -> Bools:
     """Samples of the few blocks of a run-up in which most is left; none where it is left all along: a cause does so."""
     over = np.where(state == STATES.index("start"), _over_chance(rest, block), 0.0)
     marks = np.asarray(over > OF_WORST * over.max(initial=0.0))
-    return marks & bool(marks.sum() <= MOST_WITHIN * block)
+    return np.asarray(marks & (marks.sum() <= MOST_WITHIN * block))
 
 
 def _over_chance(rest: Array, block: int) -> Array:
