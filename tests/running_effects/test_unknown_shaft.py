@@ -174,18 +174,19 @@ def test_an_inertia_without_a_start_is_not_as_heavy_as_noise_makes_it(ripple: fl
         assert found.std < 0.15 * true
 
 
-HEAVY = {"inertia": 0.5, "load_constant": 0.1, "load_fan": 0.3}
-"""A run-up of 1.24 s, along which a small error of the speed swings up until the torque's peak is passed."""
+HEAVY = {"inertia": 0.6, "load_constant": 0.1, "load_fan": 0.3}
+"""A run-up beyond the load's step at 1.19 s."""
 
 
 def test_noise_is_weighed_at_the_speed_that_the_machine_runs_at() -> None:
-    """Swung up along the run-up of a load that drives, noise of 0.5 V stood for 5 A of error: a turn fault of 3 % was not seen, a leakage that saturates
-    had a fault of its fit hidden and was unexplained."""
-    problem = problem_of(prepare([_running(0, **HEAVY)], PLATE), 0.0)
-    machine = fit.plain_machine(list(FOUR.values()), problem.record, inertia=0.5, has_shaft=True)
-    driving = machine.with_values({"load_constant": 0.5, "load_linear": -4.6, "load_fan": 4.5, "load_breakaway": -0.5})
-    totals = [with_noise_of(problem, m).noise.total for m in (driving, replace(machine, has_shaft=False))]
-    assert totals[0] < 1.2 * totals[1]
+    """Swung up along a run-up, noise of 0.5 V stood for 5 A of error: a turn fault of 3 % was not seen, and a leakage that saturates had a fault of 4 % of
+    the current taken for noise. (A light rotor swings most: 0.071 A for 0.041.)"""
+    problem = problem_of(prepare([_running(0, 4000, **HEAVY)], PLATE), 0.0)
+    totals = [
+        with_noise_of(problem, fit.plain_machine(list(FOUR.values()), problem.record, inertia=j, has_shaft=True)).noise.total
+        for j in (0.006, 0.02)
+    ]  # fmt: skip
+    assert totals[0] == pytest.approx(totals[1], rel=0.05)
 
 
 def test_a_load_step_within_a_run_up_leaves_nothing() -> None:
