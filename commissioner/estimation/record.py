@@ -11,9 +11,9 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.channels import check_sums, without_spikes
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
+from commissioner.motor.channels.faults import no_lines
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -161,8 +161,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     scales = scales_of(plate)
     period = recordings[0].sample_period_s
     windows: list[Window] = []
-    whole = [without_spikes(one) for one in recordings]
-    recordings, remarks = [one for one, _ in whole], [said for _, spikes in whole for said in spikes]
+    remarks: list[str] = []
     standing_still: list[str] = []
     has_speed, said_of_speed = _has_speed(recordings)
     remarks += said_of_speed
@@ -351,7 +350,8 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{least:.0f} samples a second",
             f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
-    check_sums(one, scales)
+    if (odd := no_lines(one, scales.current_a, scales.voltage_v)) is not None:
+        raise _refused(f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy)
     _check_speed(one, voltage, scales)
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:

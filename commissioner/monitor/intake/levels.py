@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from commissioner.monitor.intake.findings import Findings, Fundamental
-from commissioner.monitor.intake.sensors import OPEN_SUM
 from commissioner.monitor.signals.supply import Vector
+from commissioner.motor.channels.ends import clipped
+from commissioner.motor.channels.sums import OpenSum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import Signal
 
@@ -40,7 +39,7 @@ def channel_levels(currents: list[Signal], voltages: list[Signal], findings: Fin
                     "check the sensor and its wiring",
                 )
         for name, signal in zip("uvw", group, strict=True):
-            share = clipped_share(signal)
+            _, share = clipped(signal)
             if share > LARGEST_CLIPPED:
                 findings.add(
                     "clipped_channel",
@@ -68,32 +67,11 @@ def unlike_gains(difference: Signal, kind: str, findings: Findings) -> None:
         )
 
 
-def open_sum(odd: tuple[int, float] | None, kind: str, names: Sequence[str], findings: Findings) -> None:
-    """A refusal where three channels cannot be the lines of one motor; `odd` as in `Evened`."""
-    if odd is None:
-        return
-    channel, gain = odd
-    findings.add(
-        "open_sum", "refused",
-        f"the three {kind}s do not add up to zero: {kind} {names[channel]} is {gain:.3g} times what the other two leave for it",
-        gain, f"{(1 - 2 * OPEN_SUM) / (1 + OPEN_SUM):.2f} ... {(1 + 2 * OPEN_SUM) / (1 - OPEN_SUM):.2f}",
-        f"check range, ratio and turns of its sensor; and that the three {kind}s are the three lines of one motor",
-    )  # fmt: skip
-
-
-def clipped_share(signal: Signal) -> float:
-    """Share of samples on the extreme values beyond twice what the same signal puts one quantisation step further in."""
-    if signal.size == 0 or np.ptp(signal) == 0:
-        return 0.0
-    share = 0.0
-    for extreme, inward in ((signal.max(), -1.0), (signal.min(), 1.0)):
-        on_limit = int(np.sum(signal == extreme))
-        reach = np.partition(inward * (signal[signal != extreme] - extreme), 0)[0] if on_limit < signal.size else 0.0
-        width = max(reach, 1e-3 * np.ptp(signal))
-        near = int(np.sum((inward * (signal - extreme) > 0) & (inward * (signal - extreme) <= 3 * width)))
-        if on_limit > max(near, 8):
-            share += (on_limit - near / 3) / signal.size
-    return share
+def open_sum(odd: OpenSum | None, findings: Findings) -> None:
+    """A refusal where three channels cannot be the lines of one motor."""
+    if odd is not None:
+        value, limit = odd.share if odd.gain is None else odd.gain, f"{odd.limit:g} of the three left in their sum"
+        findings.add("open_sum", "refused", odd.what, value, limit, odd.remedy)
 
 
 def switched_voltage(v: Vector, fundamental: Fundamental, findings: Findings) -> None:

@@ -1,0 +1,60 @@
+"""What a channel makes of a value beyond its range: it stands at the end of it, or begins again at the other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.records import Signal
+
+LEAST_ON_LIMIT = 8
+FAR = 0.5
+"""Of a channel's range, between two samples: a jump that no current of a motor makes from one to the next."""
+MOST_WRAPS, LIKE, MOSTLY_LIKE = 0.05, 0.1, 0.8
+"""Of the samples, that are such jumps: more are pulses; by how much of it the sizes of the jumps may differ, and how many of them may not."""
+
+
+def clipped(x: Signal) -> tuple[NDArray[np.bool_], float]:
+    """(samples that sit on the channel's largest or smallest value, where more do than just inside of it; the share of all that this is
+    beyond what the same signal puts there)."""
+    rows, share = np.zeros(x.size, dtype=bool), 0.0
+    there = x[np.isfinite(x)]
+    if there.size == 0 or np.ptp(there) == 0:
+        return rows, share
+    for extreme, inward in ((there.max(), -1.0), (there.min(), 1.0)):
+        within = inward * (there - extreme)
+        on_limit = int(np.sum(within == 0.0))
+        reach = np.min(within[within > 0.0])
+        width = max(reach, 1e-3 * np.ptp(there))
+        near = int(np.sum((within > 0.0) & (within <= 3.0 * width)))
+        if on_limit > max(near, LEAST_ON_LIMIT):
+            rows |= x == extreme
+            share += (on_limit - near / 3.0) / x.size
+    return rows, share
+
+
+def unwrapped(x: Signal) -> tuple[Signal, float, int]:
+    """(the channel with what ran over its range's end and began again at the other put back, that range, samples put back); as it is, and 0,
+    where none did.
+
+    Each jump has the range's size less what the channel moved meanwhile, which its neighbours tell; put back it goes on as before.
+    """
+    d = np.nan_to_num(np.diff(x))
+    spread = float(np.nanmax(x) - np.nanmin(x)) if np.isfinite(x).any() else 0.0
+    at = np.flatnonzero(np.abs(d) > FAR * spread)
+    at = at[(at > 0) & (at < d.size - 1)]
+    if spread == 0.0 or at.size == 0 or at.size > MOST_WRAPS * x.size:
+        return x, 0.0, 0
+    sizes = np.sign(d[at]) * (d[at] - 0.5 * (d[at - 1] + d[at + 1]))
+    span = float(np.median(sizes))
+    if not span >= spread or np.mean(np.abs(sizes - span) < LIKE * span) < MOSTLY_LIKE:
+        return x, 0.0, 0
+    turns = np.zeros(x.size, dtype=np.int64)
+    turns[at + 1] = -np.sign(d[at]).astype(np.int64)
+    turns = np.cumsum(turns)
+    values, counts = np.unique(turns, return_counts=True)
+    turns -= values[np.argmax(counts)]
+    out = x + span * turns
+    if np.nanmax(np.abs(np.diff(out))) > FAR * span or np.nanmax(out) - np.nanmin(out) <= 1.01 * spread:
+        return x, 0.0, 0
+    return out, span, int(np.count_nonzero(turns))

@@ -1,0 +1,79 @@
+"""What every verb asks of the channels of a running recording, in one place: what can be put right is, and is said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from commissioner.motor.channels.ends import unwrapped
+from commissioner.motor.channels.late import Late, late, shifted
+from commissioner.motor.channels.spikes import without_spikes
+from commissioner.motor.channels.sums import OpenSum, open_sum
+from commissioner.records import ReadingNote, RunningRecording, Signal
+
+PHASES, LINES = ("u", "v", "w"), ("uv", "vw", "wu")
+SPIKES, WRAPPED, LATE = "spikes", "wrapped", "late_channel"
+Group = tuple[Signal, Signal, Signal]
+
+
+def put_right(one: RunningRecording) -> RunningRecording:
+    """The recording without wraps, spikes and delays between its channels, with a note of each."""
+    groups: list[Group] = [one.currents_a, one.voltages_v]
+    named = list(zip(("current", "voltage"), (PHASES, names_of_voltages(one)), strict=True))
+    notes, spikes, lost = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
+    for g, (kind, names) in enumerate(named):
+        channels = list(groups[g])
+        for k, name in enumerate(names):
+            channels[k], span, many = unwrapped(channels[k])
+            if many:
+                what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {'AV'[g]} away): put back"
+                notes.append(ReadingNote(WRAPPED, what))
+            channels[k], count = without_spikes(channels[k])
+            spikes += count
+        if seen := late(channels, one.sample_period_s):
+            channels = _on_time(channels, seen, one)
+            notes.append(ReadingNote(LATE, f"{seen.said(kind, names)}: shifted back"))
+            lost |= ~np.isfinite(channels).all(axis=0) & np.isfinite(groups[g]).all(axis=0)
+        groups[g] = (channels[0], channels[1], channels[2])
+    if spikes:
+        what = f"{spikes} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
+        notes.append(ReadingNote(SPIKES, what))
+    mended = replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
+    return _without_ends(mended, lost)
+
+
+def no_lines(one: RunningRecording, rated_current_peak_a: float, rated_voltage_peak_v: float) -> OpenSum | None:
+    """Three currents, or voltages, that cannot be those of one motor's lines: a doubled export, a wrong range, a dead sensor's noise."""
+    return open_sum(one.currents_a, "current", PHASES, rated_current_peak_a) or open_sum(
+        one.voltages_v, "voltage", names_of_voltages(one), rated_voltage_peak_v, may_move=not one.voltages_are_line_to_line
+    )
+
+
+def names_of_voltages(one: RunningRecording) -> tuple[str, str, str]:
+    return LINES if one.voltages_are_line_to_line else PHASES
+
+
+def _on_time(channels: Sequence[Signal], seen: Late, one: RunningRecording) -> list[Signal]:
+    """The channels shifted back; NaN where that would reach over a gap in the time."""
+    gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
+    out = []
+    for x, late_s in zip(channels, seen.late_s, strict=True):
+        parts = np.split(x, gaps) if late_s != 0.0 else [x]
+        out.append(np.concatenate([shifted(p, late_s / one.sample_period_s) for p in parts]) if late_s != 0.0 else x)
+    return out
+
+
+def _without_ends(one: RunningRecording, lost: np.ndarray) -> RunningRecording:
+    """Without the first and last rows that a shift has no value for."""
+    if not lost.any():
+        return one
+    kept = np.flatnonzero(~lost)
+    part = slice(int(kept[0]), int(kept[-1]) + 1)
+    speed = one.speed_rad_per_s
+    (u, v, w), (a, b, c) = ([x[part] for x in group] for group in (one.currents_a, one.voltages_v))
+    return replace(
+        one, time_s=one.time_s[part], currents_a=(u, v, w), voltages_v=(a, b, c),
+        speed_rad_per_s=None if speed is None else speed[part],
+    )  # fmt: skip
