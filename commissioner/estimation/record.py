@@ -13,7 +13,7 @@ from scipy.signal import savgol_filter
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
-from commissioner.motor.channels.faults import no_lines
+from commissioner.motor.channels.faults import no_lines, without_clipped
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -163,6 +163,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     windows: list[Window] = []
     remarks: list[str] = []
     standing_still: list[str] = []
+    clipped: list[str] = []
     has_speed, said_of_speed = _has_speed(recordings)
     remarks += said_of_speed
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
@@ -172,8 +173,12 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
             what = f"{one.source}: sampled at another rate than the first file"
             raise _refused(what, one.sample_period_s, period, "diagnose them one by one")
+        _check(one, _voltages(one), scales)
+        one, cut_off = without_clipped(one)
+        remarks += cut_off
+        clipped += cut_off
         current, voltage = _currents(one), _voltages(one)
-        _check(one, voltage, scales)
+        _check_lines(one, voltage, scales)
         open_phases = _open_phases(one, current, scales)
         is_open: Bools = np.asarray(open_phases.any(axis=0))
         sigmas.append([*(noise_of(current[:, k]) for k in range(3)), noise_of(voltage[:, 0]), noise_of(voltage[:, 1])])
@@ -211,6 +216,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
         windows += own
+    if not windows and clipped:
+        raise _refused(" ".join(clipped), f"less than {LEAST_S} s between them", f"{LEAST_S} s", "record with a larger range")
     if not windows:
         raise _refused(
             " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
@@ -350,9 +357,6 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{least:.0f} samples a second",
             f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
-    if (odd := no_lines(one, scales.current_a, scales.voltage_v)) is not None:
-        raise _refused(f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy)
-    _check_speed(one, voltage, scales)
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:
         raise _refused(
@@ -360,6 +364,12 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages"
             f"{_for_monitor(one, per_period)}",
         )  # fmt: skip
+
+
+def _check_lines(one: RunningRecording, voltage: Array, scales: Scales) -> None:
+    if (odd := no_lines(one, scales.current_a, scales.voltage_v)) is not None:
+        raise _refused(f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy)
+    _check_speed(one, voltage, scales)
 
 
 def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from commissioner.motor.channels.ends import unwrapped
+from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
 from commissioner.motor.channels.spikes import without_spikes
 from commissioner.motor.channels.sums import OpenSum, open_sum
@@ -42,6 +42,23 @@ def put_right(one: RunningRecording) -> RunningRecording:
         notes.append(ReadingNote(SPIKES, what))
     mended = replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
     return _without_ends(mended, lost)
+
+
+def without_clipped(one: RunningRecording) -> tuple[RunningRecording, list[str]]:
+    """The recording without the samples that sit at the end of a channel's range (NaN), and what is said of each."""
+    groups, said = [list(one.currents_a), list(one.voltages_v)], []
+    named = (("current", "A", PHASES), ("voltage", "V", names_of_voltages(one)))
+    for group, (kind, unit, names) in zip(groups, named, strict=True):
+        for k, name in enumerate(names):
+            rows, _ = clipped(group[k])
+            if rows.any() and runs_into(group[k], rows):
+                end = float(np.max(np.abs(group[k][rows])))
+                first = one.time_s[int(np.argmax(rows))]
+                what = f"{kind} {name} is clipped: {int(rows.sum())} samples, the first at {first:.3g} s, sit at the end of its range, {end:.4g} {unit}"
+                said.append(f"{one.source}: {what}: not used.")
+                group[k] = np.where(rows, np.nan, group[k])
+    (u, v, w), (a, b, c) = groups
+    return (replace(one, currents_a=(u, v, w), voltages_v=(a, b, c)) if said else one), said
 
 
 def no_lines(one: RunningRecording, rated_current_peak_a: float, rated_voltage_peak_v: float) -> OpenSum | None:

@@ -31,7 +31,9 @@ PASSES = 6
 LEAST_BLOCKS = 100
 APART = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
 """Two ways in which three channels may differ whose mean says nothing."""
-TAPS = np.arange(-2, 4)
+TAPS, DEGREE = np.arange(-4, 5), 5
+SMOOTH = np.linalg.pinv(np.vander(TAPS, DEGREE + 1, increasing=True))
+"""Coefficients of the curve through nine samples: 0.02 % off at 300 Hz of 5 kHz; noise 1.02 of what it was for half a sample."""
 
 
 @dataclass(frozen=True)
@@ -141,16 +143,19 @@ def _whole(late_s: float, std_s: float, period_s: float) -> float:
 
 
 def shifted(x: Signal, samples: float) -> Signal:
-    """The channel so many samples later than it stands there, by a polynomial through six of them; NaN where it does not reach."""
-    whole = int(np.floor(samples))
+    """The channel so many samples later than it stands there; NaN where it does not reach.
+
+    A part of a sample is added as what a smooth curve through nine samples gains over it: an interpolation takes noise away, the more the
+    nearer it is to half a sample, and a fit would weigh the three channels by a noise that one of them has not.
+    """
+    whole = round(samples)
+    if abs(samples - whole) < 1e-9:
+        return _moved(x, whole)
     part = samples - whole
-    if part == 0.0:
-        weights = [(0, 1.0)]
-    else:
-        weights = [(int(j), float(np.prod([(part - m) / (j - m) for m in TAPS if m != j]))) for j in TAPS]
-    out = np.zeros(x.size)
-    for j, weight in weights:
-        out += weight * _moved(x, whole + j)
+    gained = (part ** np.arange(DEGREE + 1) - 0.0 ** np.arange(DEGREE + 1)) @ SMOOTH
+    out = _moved(x, whole)
+    for j, weight in zip(TAPS, gained, strict=True):
+        out += weight * _moved(x, whole + int(j))
     return out
 
 
