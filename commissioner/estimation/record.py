@@ -45,6 +45,13 @@ OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
 """Of rated peak: below both the contactor is open."""
 OPEN = 0.15
 """Of rated peak: what the other phases carry where one is open."""
+LAG_DEG = (-15.0, 100.0)
+"""By which a motor's currents lag while it starts; of one that may generate up to 180 degrees more than the least."""
+READ_AS = (
+    ("all turned round", 180.0), ("v, w, u as u, v, w", 120.0), ("w, u, v as u, v, w", -120.0), ("v, w, u as u, v, w and turned round", -60.0),
+    ("w, u, v as u, v, w and turned round", 60.0),
+)  # fmt: skip
+"""Other readings of three currents, and the degrees by which they lag more in them."""
 MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
 STARTS = 2.0
@@ -215,9 +222,16 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
+        _check_order(own, one.source)
         windows += own
     if not windows and clipped:
-        raise _refused(" ".join(clipped), f"less than {LEAST_S} s between them", f"{LEAST_S} s", "record with a larger range")
+        what = f"{' '.join(clipped)} Nothing long enough is left between them."
+        raise _refused(
+            what,
+            f"less than {LEAST_S} s",
+            f"{LEAST_S} s",
+            "record with a larger range; a filter or a gain before the converter may have the smaller one",
+        )
     if not windows:
         raise _refused(
             " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
@@ -368,7 +382,9 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
 
 def _check_lines(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     if (odd := no_lines(one, scales.current_a, scales.voltage_v)) is not None:
-        raise _refused(f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy)
+        raise _refused(
+            f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy
+        )
     _check_speed(one, voltage, scales)
 
 
@@ -432,6 +448,23 @@ def _is_crossed(current: Array, voltage: Array, scales: Scales) -> bool:
     )
     driven = MOST_LOCKED * scales.current_a / scales.voltage_v * np.minimum(forward, backward)
     return bool(np.sum(np.maximum(against - driven, 0.0) ** 2) > np.sum(along**2))
+
+
+def _check_order(windows: Sequence[Window], source: str) -> None:
+    """DataRefused where the currents lag by what no motor's do: in a start they take power, in any state they magnetize."""
+    from_rest = [w for w in windows if w.is_from_rest]
+    parts = [(w.voltage[::2] @ [1, 1j], w.current[:, :2] @ [1, 1j]) for w in from_rest or windows]
+    lag = float(np.degrees(np.angle(sum(complex(np.sum(v * np.conj(i))) for v, i in parts)))) * (
+        windows[0].direction if windows else 1.0
+    )
+    least, most = LAG_DEG if from_rest else (LAG_DEG[0], 180.0 + LAG_DEG[0])
+    if not parts or least < lag < most or lag < most - 360.0:
+        return
+    others = [said for said, by in READ_AS if LAG_DEG[0] < (lag + by + 180.0) % 360.0 - 180.0 < LAG_DEG[1]]
+    raise _refused(
+        f"{source}: the currents lag their voltages by {lag:.0f} degrees, which no motor's do: channels are in another order or turned round",
+        f"{lag:.0f} degrees", f"{least:g} ... {most:g}", f"check sign and order of the current channels (a motor's lag has the currents {' or '.join(others)})",
+    )  # fmt: skip
 
 
 def _turning(x: NDArray[np.complex128], quarter: int) -> Array:

@@ -103,4 +103,6 @@ class Audited:
 
     @property
     def refusal(self) -> Finding | None:
-        return next((finding for finding in self.findings if finding.stops), None)
+        """What stops it; that it is short, which leaves what the terminals say, where nothing else does."""
+        stops = [finding for finding in self.findings if finding.stops]
+        return next((finding for finding in stops if finding.code != "too_short"), stops[0] if stops else None)

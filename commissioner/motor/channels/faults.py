@@ -14,12 +14,12 @@ from commissioner.motor.channels.sums import OpenSum, open_sum
 from commissioner.records import ReadingNote, RunningRecording, Signal
 
 PHASES, LINES = ("u", "v", "w"), ("uv", "vw", "wu")
-SPIKES, WRAPPED, LATE = "spikes", "wrapped", "late_channel"
+SPIKES, WRAPPED, LATE, POLARITY = "spikes", "wrapped", "late_channel", "polarity"
 Group = tuple[Signal, Signal, Signal]
 
 
 def put_right(one: RunningRecording) -> RunningRecording:
-    """The recording without wraps, spikes and delays between its channels, with a note of each."""
+    """The recording without wraps, spikes, a turned sign and delays between its channels, with a note of each."""
     groups: list[Group] = [one.currents_a, one.voltages_v]
     named = list(zip(("current", "voltage"), (PHASES, names_of_voltages(one)), strict=True))
     notes, spikes, lost = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
@@ -32,6 +32,10 @@ def put_right(one: RunningRecording) -> RunningRecording:
                 notes.append(ReadingNote(WRAPPED, what))
             channels[k], count = without_spikes(channels[k])
             spikes += count
+        if (k := _turned(channels, kind, names)) is not None:
+            channels[k] = -channels[k]
+            what = f"{kind} {names[k]} is minus what the other two leave for it: its sign was turned (or that of both others)"
+            notes.append(ReadingNote(POLARITY, what))
         if seen := late(channels, one.sample_period_s):
             channels = _on_time(channels, seen, one)
             notes.append(ReadingNote(LATE, f"{seen.said(kind, names)}: shifted back"))
@@ -64,12 +68,25 @@ def without_clipped(one: RunningRecording) -> tuple[RunningRecording, list[str]]
 def no_lines(one: RunningRecording, rated_current_peak_a: float, rated_voltage_peak_v: float) -> OpenSum | None:
     """Three currents, or voltages, that cannot be those of one motor's lines: a doubled export, a wrong range, a dead sensor's noise."""
     return open_sum(one.currents_a, "current", PHASES, rated_current_peak_a) or open_sum(
-        one.voltages_v, "voltage", names_of_voltages(one), rated_voltage_peak_v, may_move=not one.voltages_are_line_to_line
+        one.voltages_v,
+        "voltage",
+        names_of_voltages(one),
+        rated_voltage_peak_v,
+        may_move=not one.voltages_are_line_to_line,
     )
 
 
 def names_of_voltages(one: RunningRecording) -> tuple[str, str, str]:
     return LINES if one.voltages_are_line_to_line else PHASES
+
+
+def _turned(channels: Sequence[Signal], kind: str, names: Sequence[str]) -> int | None:
+    """The one channel whose sign alone keeps the three from adding up to zero."""
+    seen = open_sum(channels, kind, names, 0.0)
+    if seen is None or seen.odd is None or not seen.is_turned:
+        return None
+    whole = [-x if k == seen.odd else x for k, x in enumerate(channels)]
+    return seen.odd if open_sum(whole, kind, names, 0.0) is None else None
 
 
 def _on_time(channels: Sequence[Signal], seen: Late, one: RunningRecording) -> list[Signal]:

@@ -20,6 +20,8 @@ BLOCK_S = 4e-4
 """Over which samples are averaged first: noise in a derivative makes it look smaller than it is."""
 SURE, LEAST_S, LEAST_GAIN = 8.0, 4e-6, 0.25
 """Standard deviations and seconds from which a delay is one, and the part of what is left that delays must take off beside gains alone."""
+UNLIKE = 4.0
+"""Standard deviations from which gains differ as well: beside them a delay is known several times worse."""
 MOST_S, MOST_GAIN = 5e-3, 0.4
 """A delay beyond it is another recording's; a gain beyond it another fault."""
 EXPLAINS, NOISY = 0.9, 1.3
@@ -27,6 +29,8 @@ EXPLAINS, NOISY = 0.9, 1.3
 ALONE, WHOLE = 0.2, 0.05
 """Of the largest delay, by which two channels may differ that are on time together; of a sample, by which a delay may miss a whole number of them
 to be one."""
+JUMPS, MOSTLY_USUAL = 10.0, 0.98
+"""Of what is left in the median, from which a block holds a jump; of the blocks, the part that do not, or what is left is another kind of fault."""
 PASSES = 6
 LEAST_BLOCKS = 100
 APART = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
@@ -98,13 +102,21 @@ def _fitted(x: Array, size: int, step_s: float, *, is_first: bool) -> tuple[Arra
         return None
     plain = np.stack([one, *(APART @ own / unit[0])], axis=1)
     full = np.concatenate([plain, -(APART @ slope).T / unit[1]], axis=1)
-    gains, left_plain = _solved(plain, total)
+    _, left = _solved(full, total)
+    usual = np.abs(left) < JUMPS * float(np.median(np.abs(left)))
+    if np.mean(usual) > MOSTLY_USUAL:  # a contactor's closing between two samples
+        plain, full, total = plain[usual], full[usual], total[usual]
+    _, left_plain = _solved(plain, total)
     told, left = _solved(full, total)
     if is_first and not _is_told(total, left_plain, left, told, unit[0]):
         return None
-    covariance = np.linalg.pinv(full.T @ full) * float(left @ left) / max(left.size - 5, 1)
-    std = float(np.sqrt(np.trace(covariance[3:, 3:]) / 2.0)) / unit[1]
-    return APART.T @ told[3:] / unit[1], std
+    timed = np.concatenate([plain[:, :1], full[:, 3:]], axis=1)
+    of_time, left_timed = _solved(timed, total)
+    if float(left_timed @ left_timed - left @ left) * total.size < UNLIKE**2 * float(left @ left):
+        full, told, left = timed, of_time, left_timed  # no gain is needed beside them
+    covariance = np.linalg.pinv(full.T @ full) * float(left @ left) / max(left.size - told.size, 1)
+    std = float(np.sqrt(np.trace(covariance[-2:, -2:]) / 2.0)) / unit[1]
+    return APART.T @ told[-2:] / unit[1], std
 
 
 def _solved(columns: Array, total: Array) -> tuple[Array, Array]:
