@@ -13,7 +13,9 @@ from scipy.signal import savgol_filter
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
+from commissioner.motor.channels.clock import off_mains, wrong_unit
 from commissioner.motor.channels.faults import no_lines, without_clipped
+from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -52,6 +54,12 @@ READ_AS = (
     ("w, u, v as u, v, w and turned round", 60.0),
 )  # fmt: skip
 """Other readings of three currents, and the degrees by which they lag more in them."""
+LEAST_FED = 0.003
+"""Of the rated current, at a voltage however low."""
+WANDERS = 0.1
+"""Of a sample period, by which half of the stamps are off a whole number of them."""
+STEADY_TURN = 0.05
+"""Of the supply's frequency, within which it is one."""
 MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
 STARTS = 2.0
@@ -181,7 +189,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             what = f"{one.source}: sampled at another rate than the first file"
             raise _refused(what, one.sample_period_s, period, "diagnose them one by one")
         _check(one, _voltages(one), scales)
-        one, cut_off = without_clipped(one)
+        one, cut_off = without_clipped(one)  # noqa: PLW2901
         remarks += cut_off
         clipped += cut_off
         current, voltage = _currents(one), _voltages(one)
@@ -223,6 +231,10 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
         _check_order(own, one.source)
+        supply_hz = _supply_hz(one, voltage, scales)
+        _check_sizes(own, one, supply_hz, scales)
+        if not _carrier_hz(one) and (said := off_mains(supply_hz)):
+            remarks.append(f"{one.source}: {said}.")
         windows += own
     if not windows and clipped:
         what = f"{' '.join(clipped)} Nothing long enough is left between them."
@@ -363,6 +375,13 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{one.source}: {one.time_s.size} samples are no recording", one.time_s.size, f"{LEAST_SAMPLES} samples, and {LEAST_S} s of a motor that is fed",
             "record a start, load steps, or a second of steady running",
         )  # fmt: skip
+    supply_hz = _supply_hz(one, voltage, scales)
+    if (unit := wrong_unit(supply_hz, scales.frequency_rad_per_s / (2 * np.pi))) is not None:
+        raise _refused(
+            f"{one.source}: by the time column the supply turns at {supply_hz:.3g} Hz: the time is in {unit}", one.sample_period_s,
+            "seconds", f"name its unit, as `time ({unit[:-len('seconds')]}seconds)`, or give seconds",
+        )  # fmt: skip
+    _check_stamps(one)
     if per_period < AS_NAMED * LEAST_RATE:
         least = LEAST_RATE * scales.frequency_rad_per_s / (2 * np.pi)
         raise _refused(
@@ -388,16 +407,62 @@ def _check_lines(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     _check_speed(one, voltage, scales)
 
 
+def _block(one: RunningRecording) -> int:
+    """Rows of a period of the supply, and enough of them where the time column is in another unit."""
+    return max(round(BLOCK_S / one.sample_period_s), LEAST_SAMPLES)
+
+
+def _turn(one: RunningRecording, voltage: Array, scales: Scales) -> tuple[Array, Bools]:
+    """(rad/s by which the voltage turns in blocks of a period, whether it is there in all of a block)."""
+    block = _block(one)
+    whole = one.time_s.size // block * block
+    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
+    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
+    return turn, (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & (turn > 0.0)
+
+
+def _supply_hz(one: RunningRecording, voltage: Array, scales: Scales) -> float:
+    """Of most of the recording; 0 where the motor is not fed, or by a frequency that moves."""
+    turn, is_fed = _turn(one, voltage, scales)
+    if not is_fed.any():
+        return 0.0
+    least, median, most = np.quantile(turn[is_fed], (0.1, 0.5, 0.9))
+    return float(median) / (2 * np.pi) if most - least < STEADY_TURN * median else 0.0
+
+
+def _check_stamps(one: RunningRecording) -> None:
+    """DataRefused where time stamps wander by half a period: no stretch would be left between them. (Lost rows make steps of whole ones.)"""
+    steps = np.diff(one.time_s) / one.sample_period_s
+    wander = int(np.count_nonzero(~((steps > 0.0) & (steps < 1.5))))
+    if wander > MOST_JUMPS and float(np.median(np.abs(steps - np.round(steps)))) > WANDERS:
+        raise _refused(
+            f"{one.source}: the time stamps wander: {wander} steps are none of one sample period", f"{np.std(steps):.2g} of a period rms",
+            "a stamp within half a period", "record with a hardware clock; if the samples were taken at even steps, leave the time column out and give `# sample_period_s:`",
+        )  # fmt: skip
+
+
+def _check_sizes(windows: Sequence[Window], one: RunningRecording, supply_hz: float, scales: Scales) -> None:
+    """DataRefused where most of what flows, or of the voltage, is of a size that this motor cannot have."""
+    if not windows:
+        return
+    amps, volts = (np.concatenate([np.hypot(*x.T) for x in group]) for group in ([w.current[:, :2] for w in windows], [w.voltage[::2] for w in windows]))
+    rated_hz = scales.frequency_rad_per_s / (2 * np.pi)
+    levels = [current_level(float(np.median(amps)) / scales.current_a, LEAST_FED, 1.5 * MOST_LOCKED)]
+    if supply_hz > 0.0:
+        levels.append(voltage_level(float(np.median(volts)) / scales.voltage_v * rated_hz / supply_hz, supply_hz / rated_hz))
+    for level in levels:
+        if level is not None:
+            raise _refused(f"{one.source}: {level.what}", f"{level.value:.3g} of the plate's", level.limit, level.remedy)
+
+
 def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     """Refused where the shaft is told to turn much faster than the field of the voltage: another unit."""
     if one.speed_rad_per_s is None:
         return
-    block = max(round(BLOCK_S / one.sample_period_s), 2)
-    whole = one.time_s.size // block * block
-    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
-    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
-    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[:whole].reshape(-1, block)).mean(axis=1)
-    is_fed = (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & np.isfinite(speed) & (turn > 0.0)
+    turn, is_fed = _turn(one, voltage, scales)
+    block = _block(one)
+    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[: turn.size * block].reshape(-1, block)).mean(axis=1)
+    is_fed &= np.isfinite(speed)
     ratio = float(np.median(speed[is_fed] / turn[is_fed])) if is_fed.any() else 0.0
     if ratio > MOST_OVER_FIELD:
         raise _refused(

@@ -81,6 +81,8 @@ def inspect(
         # of means over a carrier what is left of its ripple turns the vector as jitter would
         clock.hidden_jitter(v, supply, fundamental, period, findings)
     levels.plausible_size(fundamental, plate, findings)
+    if not recording.metadata.get("switching_frequency_hz"):
+        levels.of_mains(fundamental, findings)
     even_i = evened(straight_i, True, supply, period)
     even_v = evened(straight_v, recording.voltages_are_line_to_line, supply, period)
     levels.unlike_gains(even_i.difference, "current", findings)

@@ -6,7 +6,9 @@ import numpy as np
 
 from commissioner.monitor.intake.findings import Findings, Fundamental
 from commissioner.monitor.signals.supply import Vector
+from commissioner.motor.channels.clock import off_mains
 from commissioner.motor.channels.ends import clipped
+from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.motor.channels.sums import OpenSum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import Signal
@@ -14,12 +16,6 @@ from commissioner.records import Signal
 LARGEST_CLIPPED = 0.002
 """Share of samples that sit on the same extreme value beyond what a sine would put there."""
 NOTED_GAIN = 0.01
-LEAST_CURRENT, LARGEST_CURRENT = 0.12, 3.0
-"""Of the rated current: no motor idles on less, none runs in a steady state on more."""
-LARGEST_VOLTS_PER_HERTZ = 1.45
-LARGEST_FROM_HALF = 1.37
-"""Of the rated volts per hertz; from half the rated frequency on, where no resistance asks for more, less: 50 Hz at the voltage of
-60 with a tenth of overvoltage is 1.32, a peak value taken for an rms one 1.41."""
 LARGEST_RIPPLE = 0.35
 """Share of the voltage's rms that is not its fundamental: beyond it the voltage is a switched one, sampled without filter."""
 
@@ -105,34 +101,17 @@ def plausible_size(fundamental: Fundamental, plate: Nameplate, findings: Finding
     root three too large or too small, and 30 degrees off.
     """
     share = abs(fundamental.current_a) / (np.sqrt(2) * plate.rated_current_a)
-    if not LEAST_CURRENT < share < LARGEST_CURRENT:
-        findings.add(
-            "current_level",
-            "refused",
-            f"the currents are {share:.3g} times the rated one",
-            float(share),
-            f"{LEAST_CURRENT:g} ... {LARGEST_CURRENT:g}",
-            "give the currents in ampere (probe factor, mA?), or correct the plate",
-        )
     per_hertz = abs(fundamental.voltage_v) / fundamental.frequency_hz
     rated = plate.rated_voltage_v * np.sqrt(2 / 3) / plate.rated_frequency_hz
-    if abs(per_hertz / rated * np.sqrt(3.0) - 1) < 0.05:
+    of_volts = voltage_level(float(per_hertz / rated), fundamental.frequency_hz / plate.rated_frequency_hz)
+    for level in (current_level(float(share)), of_volts):
+        if level is not None:
+            findings.add(level.code, "refused", level.what, level.value, level.limit, level.remedy)
+
+
+def of_mains(fundamental: Fundamental, findings: Findings) -> None:
+    """A note where the supply is near the mains' frequency, and not at it."""
+    if (said := off_mains(fundamental.frequency_hz)) is not None:
         findings.add(
-            "voltage_level",
-            "refused",
-            "the voltages are root three too small for this motor: phase voltages under the names of line-to-line ones?",
-            float(per_hertz / rated),
-            f"0.61 ... {LARGEST_FROM_HALF:g}",
-            "name the columns voltage_u_v, voltage_v_v, voltage_w_v, or correct the plate",
-        )
-    is_slow = fundamental.frequency_hz < 0.5 * plate.rated_frequency_hz
-    largest = LARGEST_VOLTS_PER_HERTZ if is_slow else LARGEST_FROM_HALF
-    if per_hertz > largest * rated:
-        findings.add(
-            "voltage_level",
-            "refused",
-            "the voltages are too large for this motor: line-to-line under the names of phase voltages, or peak for rms?",
-            float(per_hertz / rated),
-            largest,
-            "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
+            "clock_rate", "note", said, fundamental.frequency_hz, "50 or 60 Hz", "check sample_period_s and the time column"
         )

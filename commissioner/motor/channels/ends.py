@@ -16,6 +16,8 @@ WHOLE_SPREAD = 0.98
 """Of the distance between the channel's largest and smallest value, the range's size at least."""
 OF_POWERS = 5e-3
 """By which a range's size may miss a power of two of the channel's steps."""
+LEAST_JUMPS = 2
+"""One way and back: a single one is lost rows."""
 MOST_WRAPS, LIKE, MOSTLY_LIKE = 0.05, 0.1, 0.8
 """Of the samples, that are such jumps: more are pulses; by how much of it the sizes of the jumps may differ, and how many of them may not."""
 
@@ -56,7 +58,7 @@ def unwrapped(x: Signal) -> tuple[Signal, float, int]:
     spread = float(np.nanmax(x) - np.nanmin(x)) if np.isfinite(x).any() else 0.0
     at = np.flatnonzero(np.abs(d) > FAR * spread)
     at = at[(at > 1) & (at < d.size - 2)]
-    if spread == 0.0 or at.size == 0 or at.size > MOST_WRAPS * x.size:
+    if spread == 0.0 or at.size < LEAST_JUMPS or at.size > MOST_WRAPS * x.size:
         return x, 0.0, 0
     usual = (4.0 * (d[at - 1] + d[at + 1]) - (d[at - 2] + d[at + 2])) / 6.0
     sizes = np.sign(d[at]) * (d[at] - usual)

@@ -7,19 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from commissioner.errors import DataRefused
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
+from commissioner.motor.channels.rows import held, written_twice
 from commissioner.motor.channels.spikes import without_spikes
 from commissioner.motor.channels.sums import OpenSum, open_sum
 from commissioner.records import ReadingNote, RunningRecording, Signal
 
 PHASES, LINES = ("u", "v", "w"), ("uv", "vw", "wu")
 SPIKES, WRAPPED, LATE, POLARITY = "spikes", "wrapped", "late_channel", "polarity"
+HELD = "held_rows"
 Group = tuple[Signal, Signal, Signal]
 
 
 def put_right(one: RunningRecording) -> RunningRecording:
     """The recording without wraps, spikes, a turned sign and delays between its channels, with a note of each."""
+    _require_once(one)
+    one = _without_held(one)
     groups: list[Group] = [one.currents_a, one.voltages_v]
     named = list(zip(("current", "voltage"), (PHASES, names_of_voltages(one)), strict=True))
     notes, spikes, lost = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
@@ -78,6 +83,31 @@ def no_lines(one: RunningRecording, rated_current_peak_a: float, rated_voltage_p
 
 def names_of_voltages(one: RunningRecording) -> tuple[str, str, str]:
     return LINES if one.voltages_are_line_to_line else PHASES
+
+
+def _require_once(one: RunningRecording) -> None:
+    """DataRefused where a block of rows stands twice in the recording."""
+    currents = np.nan_to_num(one.currents_a)
+    twice = written_twice([*currents, *np.nan_to_num(one.voltages_v)], np.any(currents, axis=0))
+    if twice is not None:
+        first, end, of = twice
+        raise DataRefused(
+            f"{one.source}: rows {first + 1} to {end} repeat rows {of + 1} to {of + end - first}: they were written twice, and the time behind them is off",
+            step="read running recording", value=f"{end - first} rows, from {one.time_s[first]:.4g} s on", limit="each measured row once",
+            remedy="export again; or cut the recording there",
+        )  # fmt: skip
+
+
+def _without_held(one: RunningRecording) -> RunningRecording:
+    """The recording without rows in which every channel stands still (NaN): the time ran on, the samples did not."""
+    rows = held([*one.currents_a, *one.voltages_v], one.voltages_v, one.sample_period_s)
+    if not rows.any():
+        return one
+    what = f"{int(rows.sum())} rows from {one.time_s[int(np.argmax(rows))]:.4g} s on repeat the one before them in every channel while the motor is fed: not measured, left out"
+    (u, v, w), (a, b, c) = (
+        [np.where(rows, np.nan, x) for x in group] for group in (one.currents_a, one.voltages_v)
+    )
+    return replace(one, currents_a=(u, v, w), voltages_v=(a, b, c), notes=(*one.notes, ReadingNote(HELD, what)))
 
 
 def _turned(channels: Sequence[Signal], kind: str, names: Sequence[str]) -> int | None:

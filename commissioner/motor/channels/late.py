@@ -20,6 +20,9 @@ BLOCK_S = 4e-4
 """Over which samples are averaged first: noise in a derivative makes it look smaller than it is."""
 SURE, LEAST_S, LEAST_GAIN = 8.0, 4e-6, 0.25
 """Standard deviations and seconds from which a delay is one, and the part of what is left that delays must take off beside gains alone."""
+LEAST_SUM, CANCELS = 3e-4, 3.0
+"""Of the three's size, that their sum holds at least; how many times it delays may make, of which gains then take most away: of a sine the two
+are one, and what tells them apart is what its digits left."""
 UNLIKE = 4.0
 """Standard deviations from which gains differ as well: beside them a delay is known several times worse."""
 MOST_S, MOST_GAIN = 5e-3, 0.4
@@ -110,6 +113,8 @@ def _fitted(x: Array, size: int, step_s: float, *, is_first: bool) -> tuple[Arra
     told, left = _solved(full, total)
     if is_first and not _is_told(total, left_plain, left, told, unit[0]):
         return None
+    if is_first and np.mean((full[:, 3:] @ told[3:]) ** 2) > CANCELS**2 * np.mean(total**2):
+        return None
     timed = np.concatenate([plain[:, :1], full[:, 3:]], axis=1)
     of_time, left_timed = _solved(timed, total)
     if float(left_timed @ left_timed - left @ left) * total.size < UNLIKE**2 * float(left @ left):
@@ -128,6 +133,8 @@ def _is_told(total: Array, left_plain: Array, left: Array, told: Array, unit: fl
     """Whether gains and delays explain the sum, and delays what gains alone do not."""
     noise = (float(np.median(np.abs(np.diff(total, 6)))) / 0.6745) ** 2 / 924.0
     all_of_it, rest, rest_plain = (float(np.mean(y**2)) for y in (total, left, left_plain))
+    if all_of_it < (LEAST_SUM * unit) ** 2:
+        return False
     if (rest_plain - rest) * total.size < SURE**2 * rest or float(np.max(np.abs(told[1:3]))) > MOST_GAIN * unit:
         return False
     if rest < NOISY * noise:

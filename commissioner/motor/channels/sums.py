@@ -71,12 +71,11 @@ def open_sum(
 
 
 def _named(x: Array, share: float, limit: float, kind: str, names: Sequence[str]) -> OpenSum:
-    alike = np.atleast_2d(np.corrcoef(x))
     for j, k in ((0, 1), (1, 2), (0, 2)):
-        if alike[j, k] > SAME:
+        if _correlation(x[j], x[k]) > SAME:
             return OpenSum(kind, share, limit, f"{kind}s {names[j]} and {names[k]} are one and the same")
     left = x - x.sum(axis=0)  # minus the two others
-    with_left = np.nan_to_num([float(np.corrcoef(own, other)[0, 1]) for own, other in zip(x, left, strict=True)])
+    with_left = np.array([_correlation(own, other) for own, other in zip(x, left, strict=True)])
     k = int(np.argmax(np.abs(with_left)))
     if abs(with_left[k]) < ALIKE:
         return OpenSum(kind, share, limit, "one of them at least is something else")
@@ -84,3 +83,9 @@ def _named(x: Array, share: float, limit: float, kind: str, names: Sequence[str]
     is_turned = " (its sign is turned)" if gain < 0.0 else ""
     which = f"{kind} {names[k]} is {gain:.3g} times what the other two leave for it{is_turned}"
     return OpenSum(kind, share, limit, which, k, gain)
+
+
+def _correlation(a: Array, b: Array) -> float:
+    """Of two signals; 0 where one stands still."""
+    a, b = a - a.mean(), b - b.mean()
+    return float(a @ b) / max(float(np.sqrt((a @ a) * (b @ b))), 1e-300)
