@@ -54,6 +54,8 @@ READ_AS = (
     ("w, u, v as u, v, w and turned round", 60.0),
 )  # fmt: skip
 """Other readings of three currents, and the degrees by which they lag more in them."""
+RUN_OUT_S = 0.1
+"""From where the current of a start has fallen to twice the rated one until the shaft is near its speed."""
 LEAST_FED = 0.003
 """Of the rated current, at a voltage however low."""
 WANDERS = 0.1
@@ -230,6 +232,9 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
+        if not has_speed:
+            own, said_of_run_up = _behind_run_ups(own, one, scales)
+            remarks += said_of_run_up
         _check_order(own, one.source)
         supply_hz = _supply_hz(one, voltage, scales)
         _check_sizes(own, one, supply_hz, scales)
@@ -635,6 +640,32 @@ def _window(
         is_from_rest,
     )
     return replace(window, state=_states(window, scales, one.sample_period_s))
+
+
+def _behind_run_ups(windows: Sequence[Window], one: RunningRecording, scales: Scales) -> tuple[tuple[Window, ...], list[str]]:
+    """Without a speed: the windows without the rest of a start that began before them, and what is said of it.
+
+    Nobody knows at which speed it begins, and the load's knots are no run-up: a healthy motor was called unexplained, after 40 s.
+    """
+    block, out, said = max(round(BLOCK_S / one.sample_period_s), 1), [], []
+    for w in windows:
+        fast = np.array(_means(w, one.sample_period_s)[0]) > FAST_UP * scales.current_a
+        slow = np.flatnonzero(~fast)
+        first = int(slow[0]) * block + round(RUN_OUT_S / one.sample_period_s) if slow.size else 0
+        if w.is_from_rest or not fast[0] or not slow.size or (w.count - first) * one.sample_period_s < LEAST_S:
+            out.append(w)
+            continue
+        out.append(last_part(w, first))
+        said.append(f"{one.source}: begins in a start, at a speed that nothing tells: its first {first * one.sample_period_s:.2g} s are not used.")
+    return tuple(out), said
+
+
+def last_part(w: Window, first: int) -> Window:
+    """The window from its sample `first` on."""
+    return replace(
+        w, time_s=w.time_s[first:] - w.time_s[first], current=w.current[first:], voltage=w.voltage[2 * first :], speed=w.speed[2 * first :],
+        state=w.state[first:],
+    )  # fmt: skip
 
 
 def first_part(w: Window, count: int) -> Window:
