@@ -238,8 +238,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         _check_order(own, one.source)
         supply_hz = _supply_hz(one, voltage, scales)
         _check_sizes(own, one, supply_hz, scales)
-        if not _carrier_hz(one) and (said := off_mains(supply_hz)):
-            remarks.append(f"{one.source}: {said}.")
+        if not _carrier_hz(one) and (of_mains := off_mains(supply_hz)):
+            remarks.append(f"{one.source}: {of_mains}.")
         windows += own
     if not windows and clipped:
         what = f"{' '.join(clipped)} Nothing long enough is left between them."
@@ -450,14 +450,21 @@ def _check_sizes(windows: Sequence[Window], one: RunningRecording, supply_hz: fl
     """DataRefused where most of what flows, or of the voltage, is of a size that this motor cannot have."""
     if not windows:
         return
-    amps, volts = (np.concatenate([np.hypot(*x.T) for x in group]) for group in ([w.current[:, :2] for w in windows], [w.voltage[::2] for w in windows]))
+    amps, volts = (
+        np.concatenate([np.hypot(*x.T) for x in group])
+        for group in ([w.current[:, :2] for w in windows], [w.voltage[::2] for w in windows])
+    )
     rated_hz = scales.frequency_rad_per_s / (2 * np.pi)
     levels = [current_level(float(np.median(amps)) / scales.current_a, LEAST_FED, 1.5 * MOST_LOCKED)]
     if supply_hz > 0.0:
-        levels.append(voltage_level(float(np.median(volts)) / scales.voltage_v * rated_hz / supply_hz, supply_hz / rated_hz))
+        levels.append(
+            voltage_level(float(np.median(volts)) / scales.voltage_v * rated_hz / supply_hz, supply_hz / rated_hz)
+        )
     for level in levels:
         if level is not None:
-            raise _refused(f"{one.source}: {level.what}", f"{level.value:.3g} of the plate's", level.limit, level.remedy)
+            raise _refused(
+                f"{one.source}: {level.what}", f"{level.value:.3g} of the plate's", level.limit, level.remedy
+            )
 
 
 def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
@@ -642,7 +649,9 @@ def _window(
     return replace(window, state=_states(window, scales, one.sample_period_s))
 
 
-def _behind_run_ups(windows: Sequence[Window], one: RunningRecording, scales: Scales) -> tuple[tuple[Window, ...], list[str]]:
+def _behind_run_ups(
+    windows: Sequence[Window], one: RunningRecording, scales: Scales
+) -> tuple[tuple[Window, ...], list[str]]:
     """Without a speed: the windows without the rest of a start that began before them, and what is said of it.
 
     Nobody knows at which speed it begins, and the load's knots are no run-up: a healthy motor was called unexplained, after 40 s.
@@ -656,7 +665,9 @@ def _behind_run_ups(windows: Sequence[Window], one: RunningRecording, scales: Sc
             out.append(w)
             continue
         out.append(last_part(w, first))
-        said.append(f"{one.source}: begins in a start, at a speed that nothing tells: its first {first * one.sample_period_s:.2g} s are not used.")
+        said.append(
+            f"{one.source}: begins in a start, at a speed that nothing tells: its first {first * one.sample_period_s:.2g} s are not used."
+        )
     return tuple(out), said
 
 

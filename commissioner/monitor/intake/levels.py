@@ -113,5 +113,10 @@ def of_mains(fundamental: Fundamental, findings: Findings) -> None:
     """A note where the supply is near the mains' frequency, and not at it."""
     if (said := off_mains(fundamental.frequency_hz)) is not None:
         findings.add(
-            "clock_rate", "note", said, fundamental.frequency_hz, "50 or 60 Hz", "check sample_period_s and the time column"
+            "clock_rate",
+            "note",
+            said,
+            fundamental.frequency_hz,
+            "50 or 60 Hz",
+            "check sample_period_s and the time column",
         )

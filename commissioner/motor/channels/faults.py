@@ -6,28 +6,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
-from commissioner.motor.channels.rows import held, written_twice
+from commissioner.motor.channels.rows import held, lost, written_twice
 from commissioner.motor.channels.spikes import without_spikes
 from commissioner.motor.channels.sums import OpenSum, open_sum
-from commissioner.records import ReadingNote, RunningRecording, Signal
+from commissioner.records import ReadingNote, RunningRecording, Signal, StandstillRecording
 
 PHASES, LINES = ("u", "v", "w"), ("uv", "vw", "wu")
 SPIKES, WRAPPED, LATE, POLARITY = "spikes", "wrapped", "late_channel", "polarity"
-HELD = "held_rows"
+HELD, LOST = "held_rows", "lost_rows"
 Group = tuple[Signal, Signal, Signal]
 
 
 def put_right(one: RunningRecording) -> RunningRecording:
     """The recording without wraps, spikes, a turned sign and delays between its channels, with a note of each."""
-    _require_once(one)
     one = _without_held(one)
+    _require_once(one)
+    one = _with_losses(one)
     groups: list[Group] = [one.currents_a, one.voltages_v]
     named = list(zip(("current", "voltage"), (PHASES, names_of_voltages(one)), strict=True))
-    notes, spikes, lost = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
+    notes, spikes, beyond = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
     for g, (kind, names) in enumerate(named):
         channels = list(groups[g])
         for k, name in enumerate(names):
@@ -37,20 +39,47 @@ def put_right(one: RunningRecording) -> RunningRecording:
                 notes.append(ReadingNote(WRAPPED, what))
             channels[k], count = without_spikes(channels[k])
             spikes += count
-        if (k := _turned(channels, kind, names)) is not None:
-            channels[k] = -channels[k]
-            what = f"{kind} {names[k]} is minus what the other two leave for it: its sign was turned (or that of both others)"
+        if (odd := _turned(channels, kind, names)) is not None:
+            channels[odd] = -channels[odd]
+            what = f"{kind} {names[odd]} is minus what the other two leave for it: its sign was turned (or that of both others)"
             notes.append(ReadingNote(POLARITY, what))
         if seen := late(channels, one.sample_period_s):
-            channels = _on_time(channels, seen, one)
+            gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
+            channels = _shifted_back(channels, seen, gaps, one.sample_period_s)
             notes.append(ReadingNote(LATE, f"{seen.said(kind, names)}: shifted back"))
-            lost |= ~np.isfinite(channels).all(axis=0) & np.isfinite(groups[g]).all(axis=0)
+            beyond |= ~np.isfinite(channels).all(axis=0) & np.isfinite(groups[g]).all(axis=0)
         groups[g] = (channels[0], channels[1], channels[2])
     if spikes:
         what = f"{spikes} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
         notes.append(ReadingNote(SPIKES, what))
     mended = replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
-    return _without_ends(mended, lost)
+    return _without_ends(mended, beyond)
+
+
+def put_on_time(one: StandstillRecording) -> StandstillRecording:
+    """The recording at standstill with three currents that were taken one after another shifted back, and a note of it; else as it is. Rows at a
+    stretch's end for which no later one tells the late current are left out."""
+    if one.current_w_a is None or one.averaged is not None:
+        return one
+    currents = [one.current_u_a, one.current_v_a, one.current_w_a]
+    seen = late(currents, one.sample_period_s)
+    if seen is None:
+        return one
+    is_new = (np.diff(one.segment) != 0) | ~(np.diff(one.time_s) < 1.5 * one.sample_period_s)
+    moved = _shifted_back(currents, seen, np.flatnonzero(is_new) + 1, one.sample_period_s)
+    whole = np.isfinite(moved).all(axis=0)
+    last = np.append(is_new, True)
+    ends = np.zeros(whole.size, dtype=bool)
+    for end in np.flatnonzero(last).tolist():  # rows behind the last one that can be shifted
+        k = end
+        while k >= 0 and not whole[k]:
+            ends[k], k = True, k - 1
+    u, v, w = (np.where(np.isfinite(y), y, x)[~ends] for x, y in zip(currents, moved, strict=True))
+    note = ReadingNote(LATE, f"{seen.said('current', PHASES)}: shifted back")
+    return replace(
+        one, time_s=one.time_s[~ends], segment=one.segment[~ends], axis_deg=one.axis_deg[~ends], voltage_axis_v=one.voltage_axis_v[~ends],
+        current_u_a=u, current_v_a=v, current_w_a=w, dc_link_v=None if one.dc_link_v is None else one.dc_link_v[~ends], notes=(*one.notes, note),
+    )  # fmt: skip
 
 
 def without_clipped(one: RunningRecording) -> tuple[RunningRecording, list[str]]:
@@ -87,8 +116,10 @@ def names_of_voltages(one: RunningRecording) -> tuple[str, str, str]:
 
 def _require_once(one: RunningRecording) -> None:
     """DataRefused where a block of rows stands twice in the recording."""
+    there = np.isfinite([*one.currents_a, *one.voltages_v])
     currents = np.nan_to_num(one.currents_a)
-    twice = written_twice([*currents, *np.nan_to_num(one.voltages_v)], np.any(currents, axis=0))
+    flows = np.any(currents, axis=0) & there[there.any(axis=1)].all(axis=0)
+    twice = written_twice([*currents, *np.nan_to_num(one.voltages_v)], flows)
     if twice is not None:
         first, end, of = twice
         raise DataRefused(
@@ -104,10 +135,24 @@ def _without_held(one: RunningRecording) -> RunningRecording:
     if not rows.any():
         return one
     what = f"{int(rows.sum())} rows from {one.time_s[int(np.argmax(rows))]:.4g} s on repeat the one before them in every channel while the motor is fed: not measured, left out"
-    (u, v, w), (a, b, c) = (
-        [np.where(rows, np.nan, x) for x in group] for group in (one.currents_a, one.voltages_v)
-    )
+    (u, v, w), (a, b, c) = ([np.where(rows, np.nan, x) for x in group] for group in (one.currents_a, one.voltages_v))
     return replace(one, currents_a=(u, v, w), voltages_v=(a, b, c), notes=(*one.notes, ReadingNote(HELD, what)))
+
+
+def _with_losses(one: RunningRecording) -> RunningRecording:
+    """The recording with a gap in its time where the voltages' angle jumps and the time does not: it is no stretch without a break."""
+    steps = (
+        np.diff(one.time_s, prepend=one.time_s[0]) / one.sample_period_s if one.sample_period_s > 0.0 else one.time_s
+    )
+    found = {k: rows for k, rows in lost(one.voltages_v, one.sample_period_s).items() if 0.5 < steps[k] < 1.5}
+    if not found:
+        return one
+    later, notes = np.zeros(one.time_s.size), list(one.notes)
+    for k, rows in found.items():
+        later[k:] += max(round(rows), 1) * one.sample_period_s
+        what = f"the voltages turn on at once at {one.time_s[k]:.4g} s, by {max(round(rows), 1)} rows' turning: rows are lost that the time does not show (or the supply was switched over): taken as a gap"
+        notes.append(ReadingNote(LOST, what))
+    return replace(one, time_s=one.time_s + later, notes=tuple(notes))
 
 
 def _turned(channels: Sequence[Signal], kind: str, names: Sequence[str]) -> int | None:
@@ -119,21 +164,19 @@ def _turned(channels: Sequence[Signal], kind: str, names: Sequence[str]) -> int 
     return seen.odd if open_sum(whole, kind, names, 0.0) is None else None
 
 
-def _on_time(channels: Sequence[Signal], seen: Late, one: RunningRecording) -> list[Signal]:
-    """The channels shifted back; NaN where that would reach over a gap in the time."""
-    gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
+def _shifted_back(channels: Sequence[Signal], seen: Late, gaps: NDArray[np.int64], period_s: float) -> list[Signal]:
+    """The channels shifted back; NaN where that would reach over a gap."""
     out = []
     for x, late_s in zip(channels, seen.late_s, strict=True):
-        parts = np.split(x, gaps) if late_s != 0.0 else [x]
-        out.append(np.concatenate([shifted(p, late_s / one.sample_period_s) for p in parts]) if late_s != 0.0 else x)
+        out.append(np.concatenate([shifted(p, late_s / period_s) for p in np.split(x, gaps)]) if late_s != 0.0 else x)
     return out
 
 
-def _without_ends(one: RunningRecording, lost: np.ndarray) -> RunningRecording:
+def _without_ends(one: RunningRecording, beyond: NDArray[np.bool_]) -> RunningRecording:
     """Without the first and last rows that a shift has no value for."""
-    if not lost.any():
+    if not beyond.any():
         return one
-    kept = np.flatnonzero(~lost)
+    kept = np.flatnonzero(~beyond)
     part = slice(int(kept[0]), int(kept[-1]) + 1)
     speed = one.speed_rad_per_s
     (u, v, w), (a, b, c) = ([x[part] for x in group] for group in (one.currents_a, one.voltages_v))

@@ -14,6 +14,10 @@ HELD_S, LEAST_HELD = 1.5e-3, 4
 """Time and rows for which no fed motor's channels all stand still: 27 degrees at 50 Hz, six steps of eight bits at 5 Hz."""
 FED = 0.05
 """Of the largest voltage."""
+LEAST_TURNING, STEADY, BESIDE, LIKE_SIZE = 64, 0.3, 8, 0.7
+"""Rows that show a turning; of its largest, the voltage that turns; rows on either side of a jump, in which its size stays like this."""
+JUMPS_ON, LEAST_TURNS, MOST_LOST = 0.35, 4.0, 20
+"""rad, and usual steps, by which a voltage turns on at once where rows are lost; more such places are pulses."""
 IN_A_ROW, MOST_REPEATED = 32, 0.5
 """Rows that are alike in all channels only in a copy; part of a recording from which it repeats itself by nature (computed, without noise)."""
 ODD = np.uint64(0x9E3779B97F4A7C15)
@@ -34,6 +38,30 @@ def held(channels: Sequence[Signal], voltages: Sequence[Signal], period_s: float
     for a, b in zip(edges[::2], edges[1::2], strict=True):
         rows[a:b] = b - a >= least
     return rows
+
+
+def lost(voltages: Sequence[Signal], period_s: float) -> dict[int, float]:
+    """Of each row before which the voltages' vector jumps on by an angle at one size: by how many rows' turning, less whole periods."""
+    u, v, w = (np.nan_to_num(x) for x in voltages)
+    if not np.isfinite(voltages[2]).any():
+        w = -(u + v)
+    z = (2.0 * u - v - w) / 3.0 + 1j * (v - w) / np.sqrt(3.0)
+    if z.size < LEAST_TURNING or not period_s > 0.0:
+        return {}
+    size, turn = np.abs(z), np.angle(z[1:] * np.conj(z[:-1]))
+    steady = size > STEADY * size.max()
+    usual = float(np.median(turn[steady[1:]])) if steady[1:].any() else 0.0
+    off = np.where(steady[1:] & steady[:-1], np.angle(np.exp(1j * (turn - usual))), 0.0)
+    at = np.flatnonzero(np.abs(off) > max(JUMPS_ON, LEAST_TURNS * abs(usual))) + 1
+    if usual == 0.0 or not 0 < at.size <= MOST_LOST:
+        return {}
+    found = {}
+    for k in at.tolist():
+        around, steps = size[max(k - BESIDE, 0) : k + BESIDE], off[max(k - BESIDE, 0) : k + BESIDE]
+        is_lone = np.count_nonzero(np.abs(steps) > 0.5 * JUMPS_ON) == 1
+        if is_lone and around.size == 2 * BESIDE and around.min() > LIKE_SIZE * around.max():
+            found[k] = float((off[k - 1] / usual) % (2.0 * np.pi / abs(usual)))
+    return found
 
 
 def written_twice(channels: Sequence[Signal], flows: NDArray[np.bool_]) -> tuple[int, int, int] | None:
