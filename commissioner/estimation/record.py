@@ -206,11 +206,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
                 "one phase order",
                 "exchange two current channels, or two voltages, with --map",
             )
-        for phase, quiet in zip("uvw", open_phases, strict=True):
-            if quiet.any():
-                remarks.append(
-                    f"{one.source}: phase {phase} carries no current from {one.time_s[int(np.argmax(quiet))]:.3g} s on, {quiet.sum() * period:.2g} s in all, while the others do (a line, a fuse or a pole is open, or the sensor is dead): not used."
-                )
+        remarks += _of_open_phases(one, open_phases)
         is_backwards = _turns_backwards(voltage)
         without |= {("uwv" if is_backwards else "uvw")[k] for k in range(3) if not np.isfinite(one.currents_a[k]).any()}
         if is_backwards:
@@ -232,30 +228,11 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
-        if not has_speed:
-            own, said_of_run_up = _behind_run_ups(own, one, scales)
-            remarks += said_of_run_up
-        _check_order(own, one.source)
-        supply_hz = _supply_hz(one, voltage, scales)
-        _check_sizes(own, one, supply_hz, scales)
-        if not _carrier_hz(one) and (of_mains := off_mains(supply_hz)):
-            remarks.append(f"{one.source}: {of_mains}.")
+        own, of_windows = _checked(own, one, _supply_hz(one, voltage, scales), has_speed, scales)
+        remarks += of_windows
         windows += own
-    if not windows and clipped:
-        what = f"{' '.join(clipped)} Nothing long enough is left between them."
-        raise _refused(
-            what,
-            f"less than {LEAST_S} s",
-            f"{LEAST_S} s",
-            "record with a larger range; a filter or a gain before the converter may have the smaller one",
-        )
     if not windows:
-        raise _refused(
-            " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
-            0.0,
-            f"{LEAST_S} s",
-            "record a start, load steps, or a second of steady running, with all three phases closed",
-        )
+        raise _nothing_left(clipped, remarks)
     if sum(w.count for w in windows) > MOST_SAMPLES:
         most = MOST_SAMPLES // len(windows)
         windows = [first_part(w, min(most, w.count)) for w in windows]
@@ -274,6 +251,45 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _nothing_left(clipped: Sequence[str], remarks: Sequence[str]) -> DataRefused:
+    """Why there is no window: what was left out of it, or that there was none."""
+    if clipped:
+        what = f"{' '.join(clipped)} Nothing long enough is left between them."
+        return _refused(
+            what, f"less than {LEAST_S} s", f"{LEAST_S} s", "record with a larger range; a filter or a gain before the converter may have the smaller one"
+        )  # fmt: skip
+    return _refused(
+        " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
+        0.0,
+        f"{LEAST_S} s",
+        "record a start, load steps, or a second of steady running, with all three phases closed",
+    )
+
+
+def _of_open_phases(one: RunningRecording, open_phases: Bools) -> Iterator[str]:
+    """A remark for each phase without current while the others carry some."""
+    for phase, quiet in zip("uvw", open_phases, strict=True):
+        if quiet.any():
+            yield (
+                f"{one.source}: phase {phase} carries no current from {one.time_s[int(np.argmax(quiet))]:.3g} s on, "
+                f"{quiet.sum() * one.sample_period_s:.2g} s in all, while the others do (a line, a fuse or a pole is open, or the sensor is dead): not used."
+            )
+
+
+def _checked(
+    own: tuple[Window, ...], one: RunningRecording, supply_hz: float, has_speed: bool, scales: Scales
+) -> tuple[tuple[Window, ...], list[str]]:
+    """(a recording's windows, what is said of them). DataRefused: of no motor, or not of this one."""
+    said: list[str] = []
+    if not has_speed:
+        own, said = _behind_run_ups(own, one, scales)
+    _check_order(own, one.source)
+    _check_sizes(own, one, supply_hz, scales)
+    if not _carrier_hz(one) and (of_mains := off_mains(supply_hz)):
+        said.append(f"{one.source}: {of_mains}.")
+    return own, said
 
 
 def _has_speed(recordings: Sequence[RunningRecording]) -> tuple[bool, list[str]]:

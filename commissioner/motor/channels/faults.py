@@ -67,7 +67,7 @@ def put_on_time(one: StandstillRecording) -> StandstillRecording:
         return one
     is_new = (np.diff(one.segment) != 0) | ~(np.diff(one.time_s) < 1.5 * one.sample_period_s)
     moved = _shifted_back(currents, seen, np.flatnonzero(is_new) + 1, one.sample_period_s)
-    whole = np.isfinite(moved).all(axis=0)
+    whole: NDArray[np.bool_] = np.asarray(np.isfinite(moved).all(axis=0))
     last = np.append(is_new, True)
     ends = np.zeros(whole.size, dtype=bool)
     for end in np.flatnonzero(last).tolist():  # rows behind the last one that can be shifted

@@ -121,11 +121,11 @@ def _fitted(x: Array, size: int, step_s: float, *, is_first: bool) -> tuple[Arra
         full, told, left = timed, of_time, left_timed  # no gain is needed beside them
     covariance = np.linalg.pinv(full.T @ full) * float(left @ left) / max(left.size - told.size, 1)
     std = float(np.sqrt(np.trace(covariance[-2:, -2:]) / 2.0)) / unit[1]
-    return np.asarray(APART.T @ told[-2:] / unit[1], dtype=np.float64), std
+    return (APART.T @ told[-2:] / unit[1]).astype(np.float64), std
 
 
 def _solved(columns: Array, total: Array) -> tuple[Array, Array]:
-    told = np.linalg.lstsq(columns, total, rcond=None)[0]
+    told = np.linalg.lstsq(columns, total, rcond=None)[0].astype(np.float64)
     return told, total - columns @ told
 
 

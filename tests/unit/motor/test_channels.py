@@ -7,9 +7,11 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.record import prepare, scales_of
+from commissioner.motor.channels.clock import off_mains
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
-from commissioner.motor.channels.faults import no_lines, put_right
+from commissioner.motor.channels.faults import no_lines, put_on_time, put_right
 from commissioner.motor.channels.late import late, shifted
+from commissioner.records import StandstillRecording
 from sim.motoring.recording import record
 from tests.running_effects.cases import Case, as_plate, as_recording, taken
 
@@ -221,3 +223,91 @@ def test_one_turned_sensor_is_turned_back_and_an_order_that_makes_no_motor_is_re
         with pytest.raises(DataRefused, match="which no motor's do") as refused:
             prepare([replace(recording, currents_a=currents)], plate)
         assert says in refused.value.remedy
+
+
+def without_rows(recording, kept, *, shows):
+    """These rows alone; `shows`: whether the time tells of the others."""
+    time = recording.time_s[kept] if shows else recording.sample_period_s * np.arange(kept.size)
+    currents, voltages = (tuple(x[kept] for x in g) for g in (recording.currents_a, recording.voltages_v))
+    return replace(
+        recording,
+        time_s=time,
+        currents_a=currents,
+        voltages_v=voltages,
+        speed_rad_per_s=recording.speed_rad_per_s[kept],
+    )
+
+
+def test_lost_rows_are_neither_wraps_nor_hidden_by_a_time_that_does_not_show_them(start):
+    recording, _ = start
+    rows = np.arange(recording.time_s.size)
+    kept = np.concatenate([rows[:6000], rows[6150:]])
+    assert put_right(without_rows(recording, kept, shows=True)).notes == ()
+    mended = put_right(without_rows(recording, kept, shows=False))
+    assert [n.code for n in mended.notes] == ["lost_rows"]
+    assert np.diff(mended.time_s)[5999] == pytest.approx(
+        51 * recording.sample_period_s
+    )  # one of the 1.5 periods cannot be seen
+
+
+def test_rows_that_stand_still_are_left_out_and_rows_written_twice_are_refused(start):
+    recording, _ = start
+    rows = np.arange(recording.time_s.size)
+    still = np.where((rows >= 6000) & (rows < 6040), 6000, rows)
+    held = put_right(replace(without_rows(recording, still, shows=False), time_s=recording.time_s))
+    assert [n.code for n in held.notes] == ["held_rows"]
+    assert np.flatnonzero(~np.isfinite(held.currents_a[0])).tolist() == list(range(6001, 6040))
+    twice = np.concatenate([rows[:6000], rows[5800:]])
+    with pytest.raises(DataRefused, match="rows 6001 to 6200 repeat rows 5801 to 6000"):
+        put_right(without_rows(recording, twice, shows=False))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda r: {"time_s": 1e3 * r.time_s, "sample_period_s": 1e3 * r.sample_period_s}, "the time is in milliseconds"),
+        (lambda r: {"time_s": r.time_s + 8e-5 * np.random.default_rng(8).standard_normal(r.time_s.size)}, "stamps wander"),
+        (lambda r: {"currents_a": tuple(1e3 * x for x in r.currents_a)}, "times the rated one"),
+        (lambda r: {"voltages_are_line_to_line": True}, "root three too small"),
+        (lambda r: {"voltages_v": tuple(a - b for a, b in zip(r.voltages_v, np.roll(r.voltages_v, -1, axis=0), strict=True))}, "too large"),
+    ],
+)  # fmt: skip
+def test_another_unit_is_named_for_what_it_is(start, change, says):
+    recording, plate = start
+    with pytest.raises(DataRefused, match=says):
+        prepare([replace(recording, **change(recording))], plate)
+
+
+def test_a_supply_that_is_off_the_mains_is_said_and_one_of_an_inverter_is_not(start):
+    recording, plate = start
+    slow = replace(recording, time_s=1.01 * recording.time_s, sample_period_s=1.01 * recording.sample_period_s)
+    assert any("if it is the mains, the sample period is 1.0 % too long" in r for r in prepare([slow], plate).remarks)
+    driven = replace(slow, metadata={**slow.metadata, "switching_frequency_hz": 4000.0})
+    assert not any("mains" in r for r in prepare([driven], plate).remarks)
+    assert off_mains(50.1) is None and off_mains(45.0) is None and "too short" in (off_mains(60.6) or "")
+
+
+def test_without_a_speed_the_rest_of_a_start_is_not_used(start):
+    """At which speed it begins nothing tells: a healthy motor was called unexplained."""
+    recording, plate = start
+    part = replace(without_rows(recording, np.arange(1000, 15000), shows=True), speed_rad_per_s=None)
+    prepared = prepare([part], plate)
+    assert any("begins in a start" in r for r in prepared.remarks)
+    assert np.hypot(*prepared.windows[0].current[:200, :2].T).max() < 2.0 * prepared.scales.current_a
+
+
+def test_currents_at_standstill_that_were_taken_one_after_another_are_shifted_back():
+    period, rng = 2e-4, np.random.default_rng(9)
+    time = period * np.arange(9000)
+    wave = np.sin(50.0 * time) + 0.4 * np.sin(400.0 * time) + 0.1 * np.sin(1700.0 * time)
+    axis = np.repeat([0.0, 60.0, 120.0], 3000)
+    turns = np.deg2rad(axis[:, None] - [0.0, 120.0, 240.0])
+    u, v, w = (wave * np.cos(turn) + 1e-3 * rng.standard_normal(time.size) for turn in turns.T)
+    segment = np.repeat([0, 1, 2], 3000)
+    late_w = np.concatenate([np.concatenate([[0.0], part[:-1]]) for part in np.split(w, 3)])
+    one = StandstillRecording(time, segment, axis, wave, u, v, late_w, None, period)
+    mended = put_on_time(one)
+    assert "current w is 200 us behind the two others" in mended.notes[0].what
+    assert mended.time_s.size == time.size - 3  # the last row of each segment
+    np.testing.assert_array_equal(mended.current_w_a, np.delete(w, [2999, 5999, 8999]))
+    assert put_on_time(replace(one, current_w_a=w)).notes == ()
