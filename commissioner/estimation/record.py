@@ -673,11 +673,19 @@ def _behind_run_ups(
     Nobody knows at which speed it begins, and the load's knots are no run-up: a healthy motor was called unexplained, after 40 s.
     """
     block, out, said = max(round(BLOCK_S / one.sample_period_s), 1), [], []
+    flows_at_once = float(np.nanmean(np.hypot(*_currents(one)[:block, :2].T))) > FAST_UP * scales.current_a
     for w in windows:
         fast = np.array(_means(w, one.sample_period_s)[0]) > FAST_UP * scales.current_a
         slow = np.flatnonzero(~fast)
         first = int(slow[0]) * block + round(RUN_OUT_S / one.sample_period_s) if slow.size else 0
-        if w.is_from_rest or not fast[0] or not slow.size or (w.count - first) * one.sample_period_s < LEAST_S:
+        if (
+            w is not windows[0]
+            or not flows_at_once
+            or w.is_from_rest
+            or not fast[0]
+            or not slow.size
+            or (w.count - first) * one.sample_period_s < LEAST_S
+        ):
             out.append(w)
             continue
         out.append(last_part(w, first))
