@@ -95,7 +95,7 @@ def require_a_motor(problem: Problem, fit: Fit) -> None:
         raise problem.record.refusal_of_standing("fit of four parameters") or DataRefused(
             f"no machine near the plate's values makes these currents: {worst.replace('_', ' ')} would be {fit.machine.value(worst):.3g} (SI)",
             step="fit of four parameters", value=fit.machine.value(worst), limit=f"within {MOST_OFF:g} times {dict(zip(FOUR, four, strict=True))[worst]:.3g}",
-            remedy="check the scale and the phase order of currents and voltages, and the plate",
+            remedy="check the scale and the phase order of currents and voltages, and the plate; whether all currents come late `commissioner diagnose` tells",
         )  # fmt: skip
 
 
