@@ -53,8 +53,8 @@ class DriveClock:
 
     def counted(self, now: Counted) -> DriveClock:
         """After another count; where it tells that the drive's time is meant to pass faster, that rate and this count alone say how old samples are."""
-        clock = replace(self, first=self.first or now)
-        first = clock.first or now
+        first = self.first or now
+        clock = replace(self, first=first)
         drive_s, ours_s = (now.samples - first.samples) * self.sample_period_s, now.answered_s - first.sent_s
         if ours_s < TOLD_FROM_S or drive_s < OTHER_TIME * ours_s:
             return clock.at_most(now.samples, now.sent_s)

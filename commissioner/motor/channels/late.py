@@ -17,7 +17,8 @@ from commissioner.records import Signal
 
 Array = NDArray[np.float64]
 BLOCK_S = 4e-4
-"""Over which samples are averaged first: noise in a derivative makes it look smaller than it is."""
+"""Over which samples are averaged first: noise in a derivative makes it look smaller than it is; of samples further apart the derivative of a
+harmonic is not known."""
 SURE, LEAST_S, LEAST_GAIN = 8.0, 4e-6, 0.25
 """Standard deviations and seconds from which a delay is one, and the part of what is left that delays must take off beside gains alone."""
 LEAST_SUM, CANCELS = 3e-4, 3.0
@@ -64,7 +65,7 @@ class Late:
 
 def late(group: Sequence[Signal], period_s: float) -> Late | None:
     """None where the three are on time together, or where their sum does not tell a delay from a gain."""
-    if not period_s > 0.0 or not np.isfinite(group).any(axis=1).all():
+    if not 0.0 < period_s <= BLOCK_S or not np.isfinite(group).any(axis=1).all():
         return None
     x, total = np.array(group), np.zeros(3)
     size = max(round(BLOCK_S / period_s), 1)

@@ -311,3 +311,14 @@ def test_currents_at_standstill_that_were_taken_one_after_another_are_shifted_ba
     assert mended.time_s.size == time.size - 3  # the last row of each segment
     np.testing.assert_array_equal(mended.current_w_a, np.delete(w, [2999, 5999, 8999]))
     assert put_on_time(replace(one, current_w_a=w)).notes == ()
+
+
+def test_samples_too_far_apart_tell_no_delay():
+    time_s = np.arange(4000) * 7e-4
+    lines = [np.sin(314.0 * (time_s - late_s) - k * 2.0944) for k, late_s in enumerate((0.0, 4.6e-5, 3.5e-5))]
+    lines = [
+        x + 0.05 * np.sin(5 * 314.0 * (time_s - late_s) + k * 2.0944)
+        for k, (x, late_s) in enumerate(zip(lines, (0.0, 4.6e-5, 3.5e-5), strict=True))
+    ]
+    assert late(lines, 4e-4) is not None
+    assert late(lines, 7e-4) is None
