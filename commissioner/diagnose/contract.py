@@ -119,6 +119,13 @@ class Excitation(TypedDict):
     has_start: bool
 
 
+class ShaftLineTold(TypedDict):
+    """A line that turns with the shaft, so many times a turn; both side bands, over the noise, root mean square."""
+
+    per_turn: int
+    over_noise: float
+
+
 class DiagnosisDocument(TypedDict):
     """Of recordings (`kind` recording; `test` running where the motor ran) or of a table of test points (`points`); of several tables
     each one under `tables`.
@@ -151,6 +158,7 @@ class DiagnosisDocument(TypedDict):
     dc_link_v: NotRequired[float | None]
     search: NotRequired[list[SearchRecord]]
     left_by_state_over_noise: NotRequired[dict[str, float | None]]
+    shaft_lines: NotRequired[list[ShaftLineTold]]
     excitation: NotRequired[Excitation | NothingRecorded]
     next_experiment: NextExperiment | None
     model_file: str | None

@@ -56,6 +56,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
         "detection_limits": _limits(seen),
         "cannot_tell": list(NEVER_NAMEABLE) if found else [],
         "left_by_state_over_noise": dict(left.by_state) if left else {},
+        "shaft_lines": [{"per_turn": line.per_turn, "over_noise": line.sigma} for line in left.shaft_lines] if left else [],
         "excitation": _excitation(seen),
         "audit": [],
         "remarks": list(seen.remarks),

@@ -18,7 +18,7 @@ from commissioner.records import DiagnosisVerdict, RunningRecording
 from commissioner.running.at_flux import at_flux, is_saturated, stator_flux_wb
 from commissioner.running.causes import CATALOGUE, tied_in
 from commissioner.running.experiment import Experiment, next_experiment
-from commissioner.running.lack import Lack, lack_of_fit, not_told, rms_errors
+from commissioner.running.residual.lack import Lack, lack_of_fit, not_told, of_shaft, rms_errors
 from commissioner.running.rules import RULES
 from commissioner.running.search import Found, Named, Step, search, so_far
 
@@ -129,7 +129,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     causes = tuple(sorted((_cause(found, one) for one in found.accepted), key=lambda c: -c.gain_share))
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain) if found.is_complete else UNFINISHED
-    remarks = [*record.remarks, *not_told(found.fit)]
+    remarks = [*record.remarks, *not_told(found.fit), *of_shaft(left)]
     if verdict == "unexplained" and causes and gain.explained_share < MOSTLY_GUESSES:
         guesses = ", ".join(c.name.replace("_", " ") for c in causes)
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")

@@ -35,8 +35,8 @@ from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
-from commissioner.running.lack import Lack, lack_of_fit, not_told
 from commissioner.running.nominal import OPEN_INERTIA, require_a_motor, with_shaft, with_speed
+from commissioner.running.residual.lack import Lack, lack_of_fit, not_told
 
 Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3

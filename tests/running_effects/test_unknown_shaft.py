@@ -16,8 +16,8 @@ from commissioner.running import nominal as nominal_fit
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import diagnose
 from commissioner.running.identification import identify
-from commissioner.running.lack import lack_of_fit, not_told
 from commissioner.running.nominal import nominal
+from commissioner.running.residual.lack import lack_of_fit, not_told
 from commissioner.running.search import Named, Search
 from tests.running_effects.start import FOUR, PERIOD, PLATE, started
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.estimation.fit import Fit, Machine, Problem, residuals, simulate
 from commissioner.estimation.record import BLOCK_S, STATES
+from commissioner.running.residual.shaft_lines import ShaftLine, without_shaft_lines
 
 Array = NDArray[np.float64]
 TRUSTED = 1.06
@@ -20,17 +21,18 @@ BURST = 7.0
 
 @dataclass(frozen=True)
 class Lack:
-    """In units of the noise: of the whole record, and of its worst 20 ms; `by_state` likewise."""
+    """In units of the noise: of the whole record, and of its worst 20 ms; `by_state` likewise. `shaft_lines`: what is counted in none of these."""
 
     sigma: float
     burst_sigma: float
     burst_at_s: float
     by_state: Mapping[str, float]
+    shaft_lines: tuple[ShaftLine, ...] = ()
 
 
 def lack_of_fit(problem: Problem, machine: Machine) -> Lack:
     """From the whitened residual of the whole record, held-out part included."""
-    parts = residuals(problem, machine)
+    parts, lines = without_shaft_lines(problem, machine, residuals(problem, machine))
     block = max(round(BLOCK_S / problem.period), 8)
     worst, at, total, count = 0.0, 0.0, 0.0, 0
     sums = dict.fromkeys(STATES, 0.0)
@@ -49,7 +51,7 @@ def lack_of_fit(problem: Problem, machine: Machine) -> Lack:
             worst, at = float(whole.max() - limit), float(np.argmax(whole) * block * problem.period)
     return Lack(
         float(np.sqrt(max(total / max(count, 1) - TRUSTED, 0.0))), float(np.sqrt(worst)), at,
-        {n: float(np.sqrt(max(sums[n] / counts[n] - 1.0, 0.0))) for n in STATES if counts[n] > 2 * block},
+        {n: float(np.sqrt(max(sums[n] / counts[n] - 1.0, 0.0))) for n in STATES if counts[n] > 2 * block}, lines,
     )  # fmt: skip
 
 
@@ -69,4 +71,14 @@ def not_told(fit: Fit) -> Iterator[str]:
         yield (
             f"Open: {names}. What these data seem to tell of it is mostly noise of the measured voltage, which the intervals allow for. "
             "Record a start, a second load or the speed."
+        )
+
+
+def of_shaft(lack: Lack) -> Iterator[str]:
+    """A remark on the lines that turn with the shaft."""
+    if lack.shaft_lines:
+        strongest = ", ".join(f"{line.per_turn} a turn {line.sigma:.2g}" for line in lack.shaft_lines[:3])
+        yield (
+            f"Lines that turn with the shaft (slots, eccentricity, a load that pulsates) stand in the currents, in units of the noise: {strongest}. "
+            "Every motor has some; no number of the machine makes them, and they are not counted as unexplained."
         )
