@@ -120,9 +120,14 @@ def _unanswered(arguments: Sequence[str]) -> CommissionerError:
     typer.echo(err=True)
     if sys.stdin is not None and sys.stdin.isatty():
         return _stopped(arguments, by="no answer")
+    instead = (
+        "`--yes` does not answer for what a person does at the drive"
+        if "--yes" in arguments
+        else "where nobody sits at one, `--yes` answers for those verbs that have it"
+    )
     return Aborted(
         "nobody answered", step=_verb(arguments), value="the end of the input", limit="an answer",
-        remedy="call it from a terminal; where nobody sits at one, `--yes` answers for those verbs that have it",
+        remedy=f"call it from a terminal; {instead}",
     )  # fmt: skip
 
 

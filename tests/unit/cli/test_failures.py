@@ -434,3 +434,16 @@ def test_a_defect_that_shows_no_text_is_reported_all_the_same(capsys):
     report = pathlib.Path(said["error"]["remedy"].rpartition(" ")[2])
     assert "udcfc" in report.read_text("utf-8")
     report.unlink()
+
+
+def test_who_said_yes_is_not_sent_to_say_yes(capsys):
+    """An assisted tuning asks what `--yes` does not answer."""
+    asking = typer.Typer()
+
+    @asking.command()
+    def tune(yes: bool = typer.Option(False, "--yes"), as_json: bool = typer.Option(False, "--json")):
+        raise typer.Abort
+
+    code, said = leave(capsys, "--yes", of=asking)
+    assert code == 4 and "what a person does at the drive" in said["error"]["remedy"]
+    assert "`--yes` answers" in leave(capsys, of=asking)[1]["error"]["remedy"]
