@@ -172,8 +172,12 @@ def _changes(w: Window, is_busy: NDArray[np.bool_], period_s: float) -> list[tup
 
 def with_knots_at(record: Record, fit: Fit, also: Sequence[NDArray[np.bool_]]) -> tuple[Machine, tuple[Column, ...]]:
     """The fitted machine with the same load told by denser knots at these samples of each window, and its columns."""
+    return with_knot_times(record, fit, knot_times(record, also))
+
+
+def with_knot_times(record: Record, fit: Fit, times: Array) -> tuple[Machine, tuple[Column, ...]]:
+    """The fitted machine with the same load told by knots at these times (windows, knots), and its columns."""
     machine = fit.machine
-    times = knot_times(record, also)
     knots = np.array([np.interp(t, *own) for t, *own in zip(times, machine.knot_times_s, machine.knots, strict=True)])
     columns = tuple(c for c in fit.columns if c.kind != "k")
     denser = replace(machine, knots=knots, knot_times_s=times)

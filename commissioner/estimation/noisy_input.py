@@ -137,19 +137,28 @@ def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:
     """The same problem, weighted by what noise of voltage, speed and current leaves in this machine's residual."""
     record = problem.record
     rng = np.random.default_rng(seed)
+    whole = problem
+    if machine.has_shaft and record.has_start:
+        problem, machine = _at_its_speed(problem, machine)
     noisy = _shaken(problem, _input_noise(problem, rng), 1.0)
-    clean = replace(machine, theta=machine.theta.copy())
-    plain, moved = (
-        simulate(problem, clean),
-        simulate(noisy, clean),
-    )
+    plain, moved = simulate(problem, machine), simulate(noisy, machine)
     shown = np.concatenate([(b[0] - a[0])[:, :2] for a, b in zip(plain, moved, strict=True)])
     if not np.isfinite(shown).all():
         raise DataRefused(
             "the fitted machine runs away from its own voltage", step="fit", value="no finite current", limit="a stable machine",
             remedy="check the plate's rated values and the scale of voltages and currents",
         )  # fmt: skip
-    return replace(problem, noise=through_machine(shown, record.sigma_a, record.has_zero, rng))
+    return replace(whole, noise=through_machine(shown, record.sigma_a, record.has_zero, rng))
+
+
+def _at_its_speed(problem: Problem, machine: Machine) -> tuple[Problem, Machine]:
+    """The machine without its shaft, and the problem with the speed that this had."""
+    windows = []
+    for w, (_, shaft) in zip(problem.record.windows, simulate(problem, machine), strict=True):
+        speed = between(shaft[:, 0])
+        turning = np.stack([speed, np.gradient(speed, 0.5 * problem.period)], axis=1)
+        windows.append(replace(w, speed=turning))
+    return replace(problem, record=replace(problem.record, windows=tuple(windows))), replace(machine, has_shaft=False)
 
 
 def chi2_by_own_noise(problem: Problem, machine: Machine) -> float:

@@ -11,9 +11,11 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.channels import check_sums, without_spikes
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
+from commissioner.motor.channels.clock import off_mains, wrong_unit
+from commissioner.motor.channels.faults import no_lines, without_clipped
+from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -45,6 +47,21 @@ OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
 """Of rated peak: below both the contactor is open."""
 OPEN = 0.15
 """Of rated peak: what the other phases carry where one is open."""
+LAG_DEG = (-15.0, 100.0)
+"""By which a motor's currents lag while it starts; of one that may generate up to 180 degrees more than the least."""
+READ_AS = (
+    ("all turned round", 180.0), ("v, w, u as u, v, w", 120.0), ("w, u, v as u, v, w", -120.0), ("v, w, u as u, v, w and turned round", -60.0),
+    ("w, u, v as u, v, w and turned round", 60.0),
+)  # fmt: skip
+"""Other readings of three currents, and the degrees by which they lag more in them."""
+RUN_OUT_S = 0.1
+"""From where the current of a start has fallen to twice the rated one until the shaft is near its speed."""
+LEAST_FED = 0.003
+"""Of the rated current, at a voltage however low."""
+WANDERS = 0.1
+"""Of a sample period, by which half of the stamps are off a whole number of them."""
+STEADY_TURN = 0.05
+"""Of the supply's frequency, within which it is one."""
 MOST_LOCKED = 10.0
 """Locked-rotor current over the rated one, at rated voltage."""
 STARTS = 2.0
@@ -161,9 +178,9 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     scales = scales_of(plate)
     period = recordings[0].sample_period_s
     windows: list[Window] = []
-    whole = [without_spikes(one) for one in recordings]
-    recordings, remarks = [one for one, _ in whole], [said for _, spikes in whole for said in spikes]
+    remarks: list[str] = []
     standing_still: list[str] = []
+    clipped: list[str] = []
     has_speed, said_of_speed = _has_speed(recordings)
     remarks += said_of_speed
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
@@ -173,8 +190,12 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
             what = f"{one.source}: sampled at another rate than the first file"
             raise _refused(what, one.sample_period_s, period, "diagnose them one by one")
+        _check(one, _voltages(one), scales)
+        one, cut_off = without_clipped(one)  # noqa: PLW2901
+        remarks += cut_off
+        clipped += cut_off
         current, voltage = _currents(one), _voltages(one)
-        _check(one, voltage, scales)
+        _check_lines(one, voltage, scales)
         open_phases = _open_phases(one, current, scales)
         is_open: Bools = np.asarray(open_phases.any(axis=0))
         sigmas.append([*(noise_of(current[:, k]) for k in range(3)), noise_of(voltage[:, 0]), noise_of(voltage[:, 1])])
@@ -185,11 +206,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
                 "one phase order",
                 "exchange two current channels, or two voltages, with --map",
             )
-        for phase, quiet in zip("uvw", open_phases, strict=True):
-            if quiet.any():
-                remarks.append(
-                    f"{one.source}: phase {phase} carries no current from {one.time_s[int(np.argmax(quiet))]:.3g} s on, {quiet.sum() * period:.2g} s in all, while the others do (a line, a fuse or a pole is open, or the sensor is dead): not used."
-                )
+        remarks += _of_open_phases(one, open_phases)
         is_backwards = _turns_backwards(voltage)
         without |= {("uwv" if is_backwards else "uvw")[k] for k in range(3) if not np.isfinite(one.currents_a[k]).any()}
         if is_backwards:
@@ -211,14 +228,11 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
+        own, of_windows = _checked(own, one, _supply_hz(one, voltage, scales), has_speed, scales)
+        remarks += of_windows
         windows += own
     if not windows:
-        raise _refused(
-            " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
-            0.0,
-            f"{LEAST_S} s",
-            "record a start, load steps, or a second of steady running, with all three phases closed",
-        )
+        raise _nothing_left(clipped, remarks)
     if sum(w.count for w in windows) > MOST_SAMPLES:
         most = MOST_SAMPLES // len(windows)
         windows = [first_part(w, min(most, w.count)) for w in windows]
@@ -237,6 +251,45 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _nothing_left(clipped: Sequence[str], remarks: Sequence[str]) -> DataRefused:
+    """Why there is no window: what was left out of it, or that there was none."""
+    if clipped:
+        what = f"{' '.join(clipped)} Nothing long enough is left between them."
+        return _refused(
+            what, f"less than {LEAST_S} s", f"{LEAST_S} s", "record with a larger range; a filter or a gain before the converter may have the smaller one"
+        )  # fmt: skip
+    return _refused(
+        " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
+        0.0,
+        f"{LEAST_S} s",
+        "record a start, load steps, or a second of steady running, with all three phases closed",
+    )
+
+
+def _of_open_phases(one: RunningRecording, open_phases: Bools) -> Iterator[str]:
+    """A remark for each phase without current while the others carry some."""
+    for phase, quiet in zip("uvw", open_phases, strict=True):
+        if quiet.any():
+            yield (
+                f"{one.source}: phase {phase} carries no current from {one.time_s[int(np.argmax(quiet))]:.3g} s on, "
+                f"{quiet.sum() * one.sample_period_s:.2g} s in all, while the others do (a line, a fuse or a pole is open, or the sensor is dead): not used."
+            )
+
+
+def _checked(
+    own: tuple[Window, ...], one: RunningRecording, supply_hz: float, has_speed: bool, scales: Scales
+) -> tuple[tuple[Window, ...], list[str]]:
+    """(a recording's windows, what is said of them). DataRefused: of no motor, or not of this one."""
+    said: list[str] = []
+    if not has_speed:
+        own, said = _behind_run_ups(own, one, scales)
+    _check_order(own, one.source)
+    _check_sizes(own, one, supply_hz, scales)
+    if not _carrier_hz(one) and (of_mains := off_mains(supply_hz)):
+        said.append(f"{one.source}: {of_mains}.")
+    return own, said
 
 
 def _has_speed(recordings: Sequence[RunningRecording]) -> tuple[bool, list[str]]:
@@ -343,6 +396,13 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{one.source}: {one.time_s.size} samples are no recording", one.time_s.size, f"{LEAST_SAMPLES} samples, and {LEAST_S} s of a motor that is fed",
             "record a start, load steps, or a second of steady running",
         )  # fmt: skip
+    supply_hz = _supply_hz(one, voltage, scales)
+    if (unit := wrong_unit(supply_hz, scales.frequency_rad_per_s / (2 * np.pi))) is not None:
+        raise _refused(
+            f"{one.source}: by the time column the supply turns at {supply_hz:.3g} Hz: the time is in {unit}", one.sample_period_s,
+            "seconds", f"name its unit, as `time ({unit[:-len('seconds')]}seconds)`, or give seconds",
+        )  # fmt: skip
+    _check_stamps(one)
     if per_period < AS_NAMED * LEAST_RATE:
         least = LEAST_RATE * scales.frequency_rad_per_s / (2 * np.pi)
         raise _refused(
@@ -351,8 +411,6 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             f"{least:.0f} samples a second",
             f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
-    check_sums(one, scales)
-    _check_speed(one, voltage, scales)
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:
         raise _refused(
@@ -362,16 +420,77 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
         )  # fmt: skip
 
 
+def _check_lines(one: RunningRecording, voltage: Array, scales: Scales) -> None:
+    if (odd := no_lines(one, scales.current_a, scales.voltage_v)) is not None:
+        raise _refused(
+            f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy
+        )
+    _check_speed(one, voltage, scales)
+
+
+def _block(one: RunningRecording) -> int:
+    """Rows of a period of the supply, and enough of them where the time column is in another unit."""
+    return max(round(BLOCK_S / one.sample_period_s), LEAST_SAMPLES)
+
+
+def _turn(one: RunningRecording, voltage: Array, scales: Scales) -> tuple[Array, Bools]:
+    """(rad/s by which the voltage turns in blocks of a period, whether it is there in all of a block)."""
+    block = _block(one)
+    whole = one.time_s.size // block * block
+    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
+    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
+    return turn, (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & (turn > 0.0)
+
+
+def _supply_hz(one: RunningRecording, voltage: Array, scales: Scales) -> float:
+    """Of most of the recording; 0 where the motor is not fed, or by a frequency that moves."""
+    turn, is_fed = _turn(one, voltage, scales)
+    if not is_fed.any():
+        return 0.0
+    least, median, most = np.quantile(turn[is_fed], (0.1, 0.5, 0.9))
+    return float(median) / (2 * np.pi) if most - least < STEADY_TURN * median else 0.0
+
+
+def _check_stamps(one: RunningRecording) -> None:
+    """DataRefused where time stamps wander by half a period: no stretch would be left between them. (Lost rows make steps of whole ones.)"""
+    steps = np.diff(one.time_s) / one.sample_period_s
+    wander = int(np.count_nonzero(~((steps > 0.0) & (steps < 1.5))))
+    if wander > MOST_JUMPS and float(np.median(np.abs(steps - np.round(steps)))) > WANDERS:
+        raise _refused(
+            f"{one.source}: the time stamps wander: {wander} steps are none of one sample period", f"{np.std(steps):.2g} of a period rms",
+            "a stamp within half a period", "record with a hardware clock; if the samples were taken at even steps, leave the time column out and give `# sample_period_s:`",
+        )  # fmt: skip
+
+
+def _check_sizes(windows: Sequence[Window], one: RunningRecording, supply_hz: float, scales: Scales) -> None:
+    """DataRefused where most of what flows, or of the voltage, is of a size that this motor cannot have."""
+    if not windows:
+        return
+    amps, volts = (
+        np.concatenate([np.hypot(*x.T) for x in group])
+        for group in ([w.current[:, :2] for w in windows], [w.voltage[::2] for w in windows])
+    )
+    rated_hz = scales.frequency_rad_per_s / (2 * np.pi)
+    levels = [current_level(float(np.median(amps)) / scales.current_a, LEAST_FED, 1.5 * MOST_LOCKED)]
+    if supply_hz > 0.0:
+        levels.append(
+            voltage_level(float(np.median(volts)) / scales.voltage_v * rated_hz / supply_hz, supply_hz / rated_hz)
+        )
+    for level in levels:
+        if level is not None:
+            raise _refused(
+                f"{one.source}: {level.what}", f"{level.value:.3g} of the plate's", level.limit, level.remedy
+            )
+
+
 def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     """Refused where the shaft is told to turn much faster than the field of the voltage: another unit."""
     if one.speed_rad_per_s is None:
         return
-    block = max(round(BLOCK_S / one.sample_period_s), 2)
-    whole = one.time_s.size // block * block
-    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
-    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
-    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[:whole].reshape(-1, block)).mean(axis=1)
-    is_fed = (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & np.isfinite(speed) & (turn > 0.0)
+    turn, is_fed = _turn(one, voltage, scales)
+    block = _block(one)
+    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[: turn.size * block].reshape(-1, block)).mean(axis=1)
+    is_fed &= np.isfinite(speed)
     ratio = float(np.median(speed[is_fed] / turn[is_fed])) if is_fed.any() else 0.0
     if ratio > MOST_OVER_FIELD:
         raise _refused(
@@ -422,6 +541,23 @@ def _is_crossed(current: Array, voltage: Array, scales: Scales) -> bool:
     )
     driven = MOST_LOCKED * scales.current_a / scales.voltage_v * np.minimum(forward, backward)
     return bool(np.sum(np.maximum(against - driven, 0.0) ** 2) > np.sum(along**2))
+
+
+def _check_order(windows: Sequence[Window], source: str) -> None:
+    """DataRefused where the currents lag by what no motor's do: in a start they take power, in any state they magnetize."""
+    from_rest = [w for w in windows if w.is_from_rest]
+    parts = [(w.voltage[::2] @ [1, 1j], w.current[:, :2] @ [1, 1j]) for w in from_rest or windows]
+    lag = float(np.degrees(np.angle(sum(complex(np.sum(v * np.conj(i))) for v, i in parts)))) * (
+        windows[0].direction if windows else 1.0
+    )
+    least, most = LAG_DEG if from_rest else (LAG_DEG[0], 180.0 + LAG_DEG[0])
+    if not parts or least < lag < most or lag < most - 360.0:
+        return
+    others = [said for said, by in READ_AS if LAG_DEG[0] < (lag + by + 180.0) % 360.0 - 180.0 < LAG_DEG[1]]
+    raise _refused(
+        f"{source}: the currents lag their voltages by {lag:.0f} degrees, which no motor's do: channels are in another order or turned round",
+        f"{lag:.0f} degrees", f"{least:g} ... {most:g}", f"check sign and order of the current channels (a motor's lag has the currents {' or '.join(others)})",
+    )  # fmt: skip
 
 
 def _turning(x: NDArray[np.complex128], quarter: int) -> Array:
@@ -527,6 +663,44 @@ def _window(
         is_from_rest,
     )
     return replace(window, state=_states(window, scales, one.sample_period_s))
+
+
+def _behind_run_ups(
+    windows: Sequence[Window], one: RunningRecording, scales: Scales
+) -> tuple[tuple[Window, ...], list[str]]:
+    """Without a speed: the windows without the rest of a start that began before them, and what is said of it.
+
+    Nobody knows at which speed it begins, and the load's knots are no run-up: a healthy motor was called unexplained, after 40 s.
+    """
+    block, out, said = max(round(BLOCK_S / one.sample_period_s), 1), [], []
+    flows_at_once = float(np.nanmean(np.hypot(*_currents(one)[:block, :2].T))) > FAST_UP * scales.current_a
+    for w in windows:
+        fast = np.array(_means(w, one.sample_period_s)[0]) > FAST_UP * scales.current_a
+        slow = np.flatnonzero(~fast)
+        first = int(slow[0]) * block + round(RUN_OUT_S / one.sample_period_s) if slow.size else 0
+        if (
+            w is not windows[0]
+            or not flows_at_once
+            or w.is_from_rest
+            or not fast[0]
+            or not slow.size
+            or (w.count - first) * one.sample_period_s < LEAST_S
+        ):
+            out.append(w)
+            continue
+        out.append(last_part(w, first))
+        said.append(
+            f"{one.source}: begins in a start, at a speed that nothing tells: its first {first * one.sample_period_s:.2g} s are not used."
+        )
+    return tuple(out), said
+
+
+def last_part(w: Window, first: int) -> Window:
+    """The window from its sample `first` on."""
+    return replace(
+        w, time_s=w.time_s[first:] - w.time_s[first], current=w.current[first:], voltage=w.voltage[2 * first :], speed=w.speed[2 * first :],
+        state=w.state[first:],
+    )  # fmt: skip
 
 
 def first_part(w: Window, count: int) -> Window:

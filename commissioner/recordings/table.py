@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.monitor.intake.columns import from_one_current
+from commissioner.motor.channels.faults import put_on_time, put_right
 from commissioner.motor.computed import COMPUTED, printed_step, without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, too_large
@@ -244,7 +245,7 @@ def to_standstill(table: Table) -> StandstillRecording:
         notes=table.notes,
         averaged=_averaged(table, segment),
     )
-    return without_computed_third(recording)
+    return put_on_time(without_computed_third(recording))
 
 
 def _without_unmeasured(table: Table, columns: Mapping[str, Signal], every: int, notes: Sequence[ReadingNote]) -> Table:
@@ -313,7 +314,7 @@ def to_running(table: Table) -> RunningRecording:
     period = float(table.metadata.get("sample_period_s", 0.0) or _usual_step(time))
     i = [columns.get(name, empty) for name in CURRENTS]
     v = [columns.get(name, empty) for name in voltages]
-    return RunningRecording(
+    return put_right(RunningRecording(
         time_s=time,
         currents_a=(i[0], i[1], i[2]),
         voltages_v=(v[0], v[1], v[2]),
@@ -323,7 +324,7 @@ def to_running(table: Table) -> RunningRecording:
         metadata=table.metadata,
         source=table.source,
         notes=table.notes,
-    )
+    ))  # fmt: skip
 
 
 def _as_recorded(table: Table, channels: Sequence[str]) -> Table:
@@ -388,10 +389,10 @@ def to_currents(table: Table) -> RunningRecording:
     empty = np.full(time.size, np.nan)
     u, v, w = (table.columns.get(name, empty) for name in CURRENTS)
     period = float(table.metadata.get("sample_period_s", 0.0) or _usual_step(time))
-    return from_one_current(RunningRecording(
+    return from_one_current(put_right(RunningRecording(
         time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,
         table.source, table.notes,
-    ))  # fmt: skip
+    )))  # fmt: skip
 
 
 def _all_but_one(names: tuple[str, str, str], columns: Mapping[str, Signal]) -> tuple[str, ...]:

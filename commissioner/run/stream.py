@@ -119,8 +119,7 @@ class Stream:
 
     def _pin(self, counted: Counted) -> None:
         stop_if(self._clock.judge(counted))
-        clock = self._clock.at_most(counted.samples, counted.sent_s)
-        self._clock = replace(clock, first=clock.first or counted)
+        self._clock = self._clock.counted(counted)
 
     def _most(self, now_s: float) -> int | None:
         """Samples that can be there: over a slow link room for more would only delay them. None: a whole window."""

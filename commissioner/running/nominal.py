@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import (
+    CALM_S,
     INERTIA,
     Fit,
     Machine,
@@ -32,6 +33,10 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
 """A fit with unknown shaft grows with these: from all at once 20 of 60 ended in a wrong valley, so none of 60."""
+HEAVY_PREFIXES_S = (1.2, 1.55, 2.0, 2.6, 3.4, 4.4)
+"""And with these while the motor still runs up: from 0.95 s to the end of 3 s one that took 2.1 s went astray from all four starts."""
+TURNS_S = 0.05
+"""From where on a prefix tells the shaft."""
 FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
 """What of the load is free in a prefix of this length: a fan is nothing before the shaft turns."""
 RUN_UP_LOAD = ("load_constant", "load_linear", "load_fan", "load_breakaway")
@@ -44,9 +49,12 @@ LOAD_RIPPLE = ("load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_
 """Of a load, once and twice a turn; like friction it takes torque from a shaft that turns, and drives none that stands."""
 STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))
 """Factors on the plate's four, tried in turn until one leaves the valley where R_s is near zero."""
-LEFT_OVER, NOT_THE_LOAD, MOST_LOOKS = 5.0, 0.1, 2
+LEFT_OVER, NOT_THE_LOAD, LEAST_BY_LOAD, MOST_LOOKS = 5.0, 0.1, 0.5, 2
 """Standard deviations of a block's chi-square from which something is left in it; the share of that beyond which a load that changes there is
-no reason; looks at what is left (a kink shows beside the first of them)."""
+no reason; the share below which it is not even tried, for a straight line tells no more; looks at what is left (a kink shows beside the first of
+them)."""
+OF_WORST, MOST_WITHIN = 0.3, 6
+"""Share of the worst block of a run-up from which another has its part in what is left there; the number of them up to which it may be a load's step."""
 ASSUMED_RUN_UP_S = 0.3
 ASSUMED_SHARES = (1.0, 0.3, 0.1)
 """Of a motor whose start was not recorded: from a load as heavy as ten of its own rotors to the bare shaft. Between two of these the valley of
@@ -73,7 +81,7 @@ def nominal(problem: Problem) -> tuple[Problem, Fit]:
     fit = with_speed(problem) if record.has_speed else with_shaft(problem)
     problem, fit = weighted(*best_reading(problem, fit))
     if not record.has_speed:
-        fit = _with_load_changes(problem, fit)
+        fit = with_load_changes(problem, fit)
     require_a_motor(problem, fit)
     return problem, fit
 
@@ -87,7 +95,7 @@ def require_a_motor(problem: Problem, fit: Fit) -> None:
         raise problem.record.refusal_of_standing("fit of four parameters") or DataRefused(
             f"no machine near the plate's values makes these currents: {worst.replace('_', ' ')} would be {fit.machine.value(worst):.3g} (SI)",
             step="fit of four parameters", value=fit.machine.value(worst), limit=f"within {MOST_OFF:g} times {dict(zip(FOUR, four, strict=True))[worst]:.3g}",
-            remedy="check the scale and the phase order of currents and voltages, and the plate",
+            remedy="check the scale and the phase order of currents and voltages, and the plate; whether all currents come late `commissioner diagnose` tells",
         )  # fmt: skip
 
 
@@ -107,34 +115,57 @@ def weighted(problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
     return problem, fit
 
 
-def _with_load_changes(problem: Problem, fit: Fit) -> Fit:
-    """With knots of the load near each other where something is left after the run-up, if they explain it.
+def with_load_changes(problem: Problem, fit: Fit) -> Fit:
+    """With knots of the load near each other where something is left, if they explain it: after the run-up, then at a few places within it.
 
     A step or a ramp that changes the current by less than `MOVES` in a block lies between knots 0.15 s apart: a healthy motor was
-    called unexplained. What such knots do not take away is no load.
+    called unexplained; so does one while a heavy motor still runs up. What such knots do not take away is no load.
     """
-    record, block = problem.record, max(round(BLOCK_S / problem.period), 8)
-    left = residuals(problem, fit.machine)
-    for _ in range(MOST_LOOKS):
-        marks = [_left_over(rest, w.state, block) for w, rest in zip(record.windows, left, strict=True)]
-        if not any(m.any() for m in marks):
-            break
-        denser = refine(problem, *with_knots_at(record, fit, marks))
-        left_then = residuals(problem, denser.machine)
-        if _excess(left_then, marks) > NOT_THE_LOAD * _excess(left, marks):
-            break
-        fit, left = denser, left_then
+    block = max(round(BLOCK_S / problem.period), 8)
+    left, known = residuals(problem, fit.machine), [np.zeros(w.count, bool) for w in problem.record.windows]
+    looks, is_refused = [_left_within, *MOST_LOOKS * [_left_over]], False
+    while looks:
+        mark = looks.pop()
+        new = [mark(rest, w.state, block) for w, rest in zip(problem.record.windows, left, strict=True)]
+        if not any(m.any() for m in new) or (is_refused and mark is _left_over):
+            continue
+        marks = [a | b for a, b in zip(known, new, strict=True)]
+        denser = _with_denser_load(problem, fit, marks, _excess(left, new))
+        left_then = residuals(problem, denser.machine) if denser else left
+        is_refused = denser is None or _excess(left_then, new) > NOT_THE_LOAD * _excess(left, new)
+        if denser and not is_refused:
+            fit, left, known = denser, left_then, marks
     return fit
+
+
+def _with_denser_load(problem: Problem, fit: Fit, marks: Sequence[Bools], excess: float) -> Fit | None:
+    """Refitted with dense knots there; None where a straight line tells that they take away little of this excess in chi-square."""
+    machine, columns = with_knots_at(problem.record, fit, marks)
+    slopes = Slopes.known(jacobian(problem, machine, columns))
+    left = slopes.apart(fit.rest[None])[0]
+    if float(fit.rest @ fit.rest - left @ left) < LEAST_BY_LOAD * excess:
+        return None
+    return refine(problem, machine, columns, first_jacobian=slopes.jacobian)
 
 
 def _left_over(rest: Array, state: NDArray[np.int64], block: int) -> Bools:
     """Samples of the blocks after the run-up in which more is left than chance leaves."""
+    return np.asarray((_over_chance(rest, block) > 0.0) & (state != STATES.index("start")))
+
+
+def _left_within(rest: Array, state: NDArray[np.int64], block: int) -> Bools:
+    """Samples of the few blocks of a run-up in which most is left; none where it is left all along: a cause does so."""
+    over = np.where(state == STATES.index("start"), _over_chance(rest, block), 0.0)
+    marks = np.asarray(over > OF_WORST * over.max(initial=0.0))
+    return np.asarray(marks & (marks.sum() <= MOST_WITHIN * block))
+
+
+def _over_chance(rest: Array, block: int) -> Array:
+    """(n,): by how much more than what chance leaves is left, mean square of a sample's block."""
     whole, width = rest.shape[0] // block, rest.shape[1]
     square = np.mean(rest[: whole * block].reshape(whole, -1) ** 2, axis=1)
-    is_left = square > 1.0 + LEFT_OVER * np.sqrt(2.0 / (block * width))
-    samples = np.zeros(rest.shape[0], dtype=bool)
-    samples[: whole * block] = np.repeat(is_left, block)
-    return np.asarray(samples & (state != STATES.index("start")))
+    over = np.maximum(square - 1.0 - LEFT_OVER * np.sqrt(2.0 / (block * width)), 0.0)
+    return np.concatenate([np.repeat(over, block), np.zeros(rest.shape[0] - whole * block)])
 
 
 def _excess(left: Sequence[Array], marks: Sequence[Bools]) -> float:
@@ -168,9 +199,9 @@ def _from_several_starts(problem: Problem, fitted: Callable[[list[float]], Fit])
     return best
 
 
-def _settled(part: Problem, machine: Machine, numbers: tuple[str, ...]) -> Machine:
-    record = part.record
-    return refine(part, machine, columns_of(numbers, record, machine), most=15, tolerance=5.0).machine
+def _settled(part: Problem, machine: Machine, numbers: tuple[str, ...], *, knots: bool = False) -> Machine:
+    columns = columns_of(numbers, part.record, machine, knots=knots)
+    return refine(part, machine, columns, most=15, tolerance=NEAR).machine
 
 
 def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
@@ -200,17 +231,42 @@ def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) 
     numbers: tuple[str, ...] = FOUR
     if record.has_start:
         numbers = (*FOUR, "inertia")
-        for seconds in PREFIXES_S:
-            if seconds < record.windows[0].time_s[-1]:
-                own = (
-                    FOUR if seconds < 0.05 else (*numbers, *(name for name, least in FREED_FROM_S if seconds >= least))
-                )
-                machine = _settled(problem.cut(seconds), machine, own)
+        machine = _grown(problem, machine)
     law = RUN_UP_LOAD if smooth_load or record.has_start else ()
     free = (*numbers, *law, *LOAD_RIPPLE)
     if record.has_start or record.plate.inertia_kg_m2:
         return refine(problem, machine, columns_of(free, record, machine, knots=not smooth_load))
     return _with_inertia(problem, machine, free, knots=not smooth_load)
+
+
+def _grown(problem: Problem, machine: Machine, beside: Sequence[str] = ()) -> Machine:
+    """Fitted to more and more of a start, with the numbers `beside` once the shaft turns; a heavy motor may be loaded while it runs up."""
+    run_up_s = _run_up_s(problem.record)
+    for seconds in (*PREFIXES_S, *(s for s in HEAVY_PREFIXES_S if s < run_up_s)):
+        if seconds < problem.record.windows[0].time_s[-1]:
+            turning = ("inertia", *beside, *(name for name, least in FREED_FROM_S if seconds >= least))
+            own = FOUR if seconds < TURNS_S else (*FOUR, *turning)
+            is_heavy = seconds in HEAVY_PREFIXES_S
+            machine = _settled(problem.cut(seconds), machine, own, knots=is_heavy)
+            machine = _going_on(machine, seconds) if is_heavy else machine
+    return machine
+
+
+def _going_on(machine: Machine, until_s: float) -> Machine:
+    """With the load of its last knot before `until_s` from there on: what a prefix hardly tells of the next one throws the shaft about."""
+    knots = machine.knots.copy()
+    for own, times in zip(knots, machine.knot_times_s, strict=True):
+        known = times < until_s - 0.5 * CALM_S
+        own[~known] = own[known][-1] if known.any() else 0.0
+    return replace(machine, knots=knots)
+
+
+def grown_anew(problem: Problem, machine: Machine, beside: Sequence[str]) -> Machine:
+    """The machine whose load and inertia are sought once more, from its start on, with these numbers free beside the four."""
+    fresh = _free_to_turn([machine.value(name) for name in FOUR], problem.record)
+    none = dict.fromkeys((*RUN_UP_LOAD, *LOAD_RIPPLE), 0.0)
+    start = replace(machine, first=fresh.first, knots=np.zeros_like(machine.knots))
+    return _grown(problem, start.with_values({**none, "inertia": fresh.value("inertia")}), beside)
 
 
 def held_at_plate(problem: Problem, fit: Fit, names: Sequence[str]) -> Fit:

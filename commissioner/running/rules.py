@@ -56,5 +56,8 @@ class Rules:
     promising_material: float = 0.1
     """And of the gain that is material: no bend of a law makes ten of one. (Without a speed, two refits of what gained 27 of 750 took half the time.)"""
 
+    kept_promise: float = 0.5
+    """Of a candidate's linear gain, where that is more than all others have gained: a refit that gains less has lost its way."""
+
 
 RULES = Rules()

@@ -18,6 +18,7 @@ from commissioner.estimation.fit import (
     numbers_of,
     refine,
     refreshed,
+    with_knot_times,
 )
 from commissioner.estimation.noisy_input import chi2_by_own_noise, unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
@@ -25,10 +26,14 @@ from commissioner.estimation.record import Record
 from commissioner.estimation.told import Slopes
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
-from commissioner.running.nominal import held_at_plate, nominal
+from commissioner.running.nominal import NEAR, grown_anew, held_at_plate, nominal, with_load_changes
 from commissioner.running.rules import RULES
 
 Array = NDArray[np.float64]
+
+
+MOST_ANEW = 30
+"""Steps of a law's shape, once its size is found anew."""
 
 
 @dataclass(frozen=True)
@@ -152,9 +157,11 @@ class Search:
         """The columns of a cause's numbers in this recording."""
         return numbers_of(numbers, self.problem.record)
 
-    def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
+    def fitted(
+        self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None, promised: float = 0.0
+    ) -> Fit:
         """With these causes free; `near` is a fit near by, whose sensitivities serve as long as they do. `first`: Jacobian for the first
-        step, without spare numbers then."""
+        step, without spare numbers then. `promised`: what the last cause is to gain beside `near`, else its way is sought anew."""
         if first is not None:
             own = [column for c in causes[-1:] for column in self.own(c.form.numbers)]
             before = self.columns(causes[:-1])
@@ -168,7 +175,24 @@ class Search:
         ]
         if new:
             rows[[j for j, c in enumerate(columns) if c not in place]] = jacobian(self.problem, start, new)
-        return refine(self.problem, start, columns, most=10, first_jacobian=rows, is_final=False)
+        fit = refine(self.problem, start, columns, most=10, first_jacobian=rows, is_final=False)
+        return self._found_anew(fit, causes, near) if near.chi2 - fit.chi2 < promised else fit
+
+    def _found_anew(self, fit: Fit, causes: Sequence[Named], near: Fit) -> Fit:
+        """The better of this fit and of one that grows with the start, the last of the causes free all along: a search that ends worse than without
+        it, or gains little of what a straight line tells, has lost its way along load and inertia of a run-up, and 50 steps do not lead it back."""
+        record = self.problem.record
+        if record.has_speed or not record.has_start or not {*near.columns} < {*fit.columns}:
+            return fit
+        *others, last = causes
+        start = self._inside(near.machine.with_values(dict.fromkeys(last.form.numbers, 0.0)), causes)
+        start = grown_anew(self.problem, start, last.form.numbers)
+        bare = (*self.columns(others), *self.own(last.form.numbers))
+        grown = refine(self.problem, start, bare, is_final=False)
+        if last.form.spare:
+            start = self._inside(grown.machine, causes)
+            grown = refine(self.problem, start, fit.columns, most=MOST_ANEW, is_final=False)
+        return min(fit, grown, key=lambda f: f.chi2)
 
     def _inside(self, machine: Machine, causes: Sequence[Named]) -> Machine:
         """A first step that left what a sign allows begins from little instead."""
@@ -219,6 +243,7 @@ def _found(seeking: Search) -> Found:
         fit, accepted = taken
         if round_ == 0:
             fit, accepted = _weighted(seeking, fit, accepted)
+        fit = _settled(seeking, fit, accepted)
         fit, accepted = _exchanged(seeking, fit, accepted)
     fit, accepted = _backward(seeking, fit, accepted)
     shown, fit, accepted = _shown(seeking, fit, accepted)
@@ -249,6 +274,25 @@ def _weighted(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[F
     for one in accepted:
         seeking.say(Step("dropped", one.cause, one.form.name, (seeking.base.chi2 - fit.chi2) / fit.scale, BEYOND))
     return seeking.base, ()
+
+
+def _settled(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> Fit:
+    """Where something is left without a speed: the fit to its end, sought anew from the start on, and both it and the plain one with knots where
+    the load changes: beside a cause that was not yet known nobody saw that, nor the valley that is the motor's."""
+    problem, record = seeking.problem, seeking.problem.record
+    if record.has_speed or fit.chi2 < RULES.nothing_left * fit.count:
+        return fit
+    denser = with_load_changes(problem, refine(problem, fit.machine, fit.columns))
+    if record.has_start and denser.chi2 > RULES.nothing_left * denser.count:
+        numbers = [n for c in accepted for n in c.form.numbers]
+        anew = refine(problem, grown_anew(problem, denser.machine, numbers), denser.columns)
+        denser = with_load_changes(problem, anew) if anew.chi2 < denser.chi2 else denser
+    if not seeking.is_plausible(denser, accepted):
+        return fit
+    times = denser.machine.knot_times_s
+    if times.shape != fit.machine.knot_times_s.shape or np.any(times != fit.machine.knot_times_s):
+        seeking.base = refine(problem, *with_knot_times(record, seeking.base, times), tolerance=NEAR)
+    return denser
 
 
 def _shown(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, Fit, tuple[Named, ...]]:
@@ -375,7 +419,8 @@ def _tried(seeking: Search, held: Fit, fit: Fit, accepted: tuple[Named, ...]) ->
         if any(t.explains_all and t.cause.cause != one.cause for t in tried):
             continue  # whoever explains as much is told apart as its rival; another form of the same cause is not
         first = np.concatenate([fit.jacobian, own])
-        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
+        hoped = RULES.kept_promise * gain if gain > max((t.gain for t in tried), default=0.0) else 0.0
+        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first, promised=hoped)
         won = fit.chi2 - other.chi2
         tried.append(Tried(one, other, won, _refusal(seeking, held, fit, other, (*accepted, one), won)))
     return sorted(tried, key=lambda t: -t.worth)

@@ -11,6 +11,7 @@ inductances are as wrong as the period that the drive states, and ages are too s
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from commissioner.safety.watch import StopReason
@@ -19,6 +20,8 @@ MOST_OFF, SLACK_S = 0.005, 0.01
 """Of the time between two counts, and besides: what the drive's time may differ from ours. Samples may be counted in bursts."""
 OTHER_TIME = 1.5
 """A time that passes so many times as fast is meant to: a simulated inverter's (`--speed N`)."""
+TOLD_FROM_S = 0.125
+"""Between two counts that tell by how many times."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +35,30 @@ class Counted:
 
 @dataclass(frozen=True)
 class DriveClock:
-    """Of one energised session. Times in s, on one monotonic clock of the host."""
+    """Of one energised session. Times in s, on one monotonic clock of the host; ages in s of the drive's time, which passes `rate` times as fast."""
 
     began_after_s: float
     sample_period_s: float
     first: Counted | None = None
+    rate: float = 1.0
 
     def at_most(self, samples: int, sent_s: float) -> DriveClock:
         """The answer to a request sent at `sent_s` showed that the drive had made `samples` and no more."""
-        began_after_s = sent_s - (samples + 1) * self.sample_period_s
+        began_after_s = sent_s - (samples + 1) * self.sample_period_s / self.rate
         return replace(self, began_after_s=max(self.began_after_s, began_after_s))
 
     def age_s(self, samples: int, now_s: float) -> float:
         """The largest time that can have passed since sample number `samples` - 1 ended."""
-        return max(0.0, now_s - self.began_after_s - samples * self.sample_period_s)
+        return max(0.0, (now_s - self.began_after_s) * self.rate - samples * self.sample_period_s)
+
+    def counted(self, now: Counted) -> DriveClock:
+        """After another count; where it tells that the drive's time is meant to pass faster, that rate and this count alone say how old samples are."""
+        first = self.first or now
+        clock = replace(self, first=first)
+        drive_s, ours_s = (now.samples - first.samples) * self.sample_period_s, now.answered_s - first.sent_s
+        if ours_s < TOLD_FROM_S or drive_s < OTHER_TIME * ours_s:
+            return clock.at_most(now.samples, now.sent_s)
+        return replace(clock, rate=drive_s / ours_s, began_after_s=-math.inf).at_most(now.samples, now.sent_s)
 
     def judge(self, now: Counted) -> StopReason | None:
         """Whether the drive's time between the first count and this one contradicts ours."""

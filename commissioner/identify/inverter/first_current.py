@@ -60,7 +60,7 @@ def first_current(levels: Sequence[HeldLevel], settled: Settled, sample_period_s
     change_a, change_v = larger_a - smaller_a, larger.voltage_v - smaller.voltage_v
     if not (change_v > 0.0 and change_a > 0.0 and smaller_a > 0.0):
         raise DataRefused(
-            "the current does not follow the voltage", step="first current", value=f"{change_a:.3g} A for {change_v:.3g} V",
+            "the current does not follow the voltage", step="first current", value=f"{smaller_a:.3g} A at {smaller.voltage_v:.3g} V, {larger_a:.3g} A at {larger.voltage_v:.3g} V",
             limit="a current that falls with the voltage",
             remedy="check the current sensors' sign and order, the motor cable and the contactor",
         )  # fmt: skip

@@ -6,6 +6,7 @@ Findings are values; `Finding.stops` marks those after which there is no torque 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from commissioner.monitor.signals.supply import (
     phase_voltages,
     space_vector,
 )
+from commissioner.motor.channels.faults import no_lines
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit
 from commissioner.records import RunningRecording, Signal
@@ -79,11 +81,14 @@ def inspect(
         # of means over a carrier what is left of its ripple turns the vector as jitter would
         clock.hidden_jitter(v, supply, fundamental, period, findings)
     levels.plausible_size(fundamental, plate, findings)
+    if not recording.metadata.get("switching_frequency_hz"):
+        levels.of_mains(fundamental, findings)
     even_i = evened(straight_i, True, supply, period)
     even_v = evened(straight_v, recording.voltages_are_line_to_line, supply, period)
-    for even, kind, order in ((even_i, "current", pairing.current_order), (even_v, "voltage", pairing.voltage_order)):
-        levels.unlike_gains(even.difference, kind, findings)
-        levels.open_sum(even.odd, kind, ["uvw"[k] for k in order], findings)
+    levels.unlike_gains(even_i.difference, "current", findings)
+    levels.unlike_gains(even_v.difference, "voltage", findings)
+    turned = _turned(recording, pairing, slice(low, high))
+    levels.open_sum(no_lines(turned, plate.rated_current_peak_a, np.sqrt(2 / 3) * plate.rated_voltage_v), findings)
     i, v = _vectors(even_i.signals, even_v.signals, recording.voltages_are_line_to_line)
     return Audited(
         low,
@@ -138,6 +143,18 @@ def _phasors(
         [fundamental_phasor(signal[:count] - signal[:count].mean(), angle) for signal in currents],
         [fundamental_phasor(signal[:count] - signal[:count].mean(), angle) for signal in voltages],
     )
+
+
+def _turned(recording: RunningRecording, pairing: channels.Pairing, part: slice) -> RunningRecording:
+    """The stretch with every channel, in its place, the way round that the pairing takes it."""
+    amps, volts = (
+        [sign * group[k][part] for k, sign in sorted(zip(order, signs, strict=True))]
+        for group, order, signs in (
+            (recording.currents_a, pairing.current_order, pairing.current_sign),
+            (recording.voltages_v, pairing.voltage_order, pairing.voltage_sign),
+        )
+    )
+    return replace(recording, currents_a=(amps[0], amps[1], amps[2]), voltages_v=(volts[0], volts[1], volts[2]))
 
 
 def _vectors(currents: Sequence[Signal], voltages: Sequence[Signal], line_to_line: bool) -> tuple[Vector, Vector]:

@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 
 from commissioner.monitor.intake.findings import Audited, Finding, Findings, Generator, miswired
-from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
+from commissioner.motor.channels.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit, slip_at_current, slip_at_power, stator_impedance
 

@@ -56,7 +56,7 @@ def whole_stretch(recording: RunningRecording, findings: Findings) -> tuple[int,
             "time does not run forward",
             float(np.nanmin(np.diff(time))),
             "steps above 0 s",
-            "sort the rows by time",
+            "sort the rows by time; stamps that only wander leave out, and give `# sample_period_s:`",
         )
     edges = np.unique(np.concatenate([[0], holes, np.flatnonzero(broken), np.flatnonzero(broken) + 1, [time.size]]))
     lengths = np.diff(edges)

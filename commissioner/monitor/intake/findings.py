@@ -11,6 +11,8 @@ from commissioner.monitor.intake.sensors import Trust
 from commissioner.monitor.signals.supply import SupplyAngle, Vector
 
 WIRING = ("crossed_channels", "polarity")
+LITTLE = ("too_short", "missing_samples")
+"""Refusals of a stretch that is whole and too short for a shaft."""
 
 
 @dataclass(frozen=True)
@@ -103,4 +105,6 @@ class Audited:
 
     @property
     def refusal(self) -> Finding | None:
-        return next((finding for finding in self.findings if finding.stops), None)
+        """What stops it; that it is short, which leaves what the terminals say, where nothing else does."""
+        stops = [finding for finding in self.findings if finding.stops]
+        return next((finding for finding in stops if finding.code not in LITTLE), stops[0] if stops else None)

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from commissioner.monitor.intake.findings import Findings, Fundamental
-from commissioner.monitor.intake.sensors import OPEN_SUM
 from commissioner.monitor.signals.supply import Vector
+from commissioner.motor.channels.clock import off_mains
+from commissioner.motor.channels.ends import clipped
+from commissioner.motor.channels.levels import current_level, voltage_level
+from commissioner.motor.channels.sums import OpenSum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import Signal
 
 LARGEST_CLIPPED = 0.002
 """Share of samples that sit on the same extreme value beyond what a sine would put there."""
 NOTED_GAIN = 0.01
-LEAST_CURRENT, LARGEST_CURRENT = 0.12, 3.0
-"""Of the rated current: no motor idles on less, none runs in a steady state on more."""
-LARGEST_VOLTS_PER_HERTZ = 1.45
-LARGEST_FROM_HALF = 1.37
-"""Of the rated volts per hertz; from half the rated frequency on, where no resistance asks for more, less: 50 Hz at the voltage of
-60 with a tenth of overvoltage is 1.32, a peak value taken for an rms one 1.41."""
 LARGEST_RIPPLE = 0.35
 """Share of the voltage's rms that is not its fundamental: beyond it the voltage is a switched one, sampled without filter."""
 
@@ -40,7 +35,7 @@ def channel_levels(currents: list[Signal], voltages: list[Signal], findings: Fin
                     "check the sensor and its wiring",
                 )
         for name, signal in zip("uvw", group, strict=True):
-            share = clipped_share(signal)
+            _, share = clipped(signal)
             if share > LARGEST_CLIPPED:
                 findings.add(
                     "clipped_channel",
@@ -68,32 +63,11 @@ def unlike_gains(difference: Signal, kind: str, findings: Findings) -> None:
         )
 
 
-def open_sum(odd: tuple[int, float] | None, kind: str, names: Sequence[str], findings: Findings) -> None:
-    """A refusal where three channels cannot be the lines of one motor; `odd` as in `Evened`."""
-    if odd is None:
-        return
-    channel, gain = odd
-    findings.add(
-        "open_sum", "refused",
-        f"the three {kind}s do not add up to zero: {kind} {names[channel]} is {gain:.3g} times what the other two leave for it",
-        gain, f"{(1 - 2 * OPEN_SUM) / (1 + OPEN_SUM):.2f} ... {(1 + 2 * OPEN_SUM) / (1 - OPEN_SUM):.2f}",
-        f"check range, ratio and turns of its sensor; and that the three {kind}s are the three lines of one motor",
-    )  # fmt: skip
-
-
-def clipped_share(signal: Signal) -> float:
-    """Share of samples on the extreme values beyond twice what the same signal puts one quantisation step further in."""
-    if signal.size == 0 or np.ptp(signal) == 0:
-        return 0.0
-    share = 0.0
-    for extreme, inward in ((signal.max(), -1.0), (signal.min(), 1.0)):
-        on_limit = int(np.sum(signal == extreme))
-        reach = np.partition(inward * (signal[signal != extreme] - extreme), 0)[0] if on_limit < signal.size else 0.0
-        width = max(reach, 1e-3 * np.ptp(signal))
-        near = int(np.sum((inward * (signal - extreme) > 0) & (inward * (signal - extreme) <= 3 * width)))
-        if on_limit > max(near, 8):
-            share += (on_limit - near / 3) / signal.size
-    return share
+def open_sum(odd: OpenSum | None, findings: Findings) -> None:
+    """A refusal where three channels cannot be the lines of one motor."""
+    if odd is not None:
+        value, limit = odd.share if odd.gain is None else odd.gain, f"{odd.limit:g} of the three left in their sum"
+        findings.add("open_sum", "refused", odd.what, value, limit, odd.remedy)
 
 
 def switched_voltage(v: Vector, fundamental: Fundamental, findings: Findings) -> None:
@@ -127,34 +101,22 @@ def plausible_size(fundamental: Fundamental, plate: Nameplate, findings: Finding
     root three too large or too small, and 30 degrees off.
     """
     share = abs(fundamental.current_a) / (np.sqrt(2) * plate.rated_current_a)
-    if not LEAST_CURRENT < share < LARGEST_CURRENT:
-        findings.add(
-            "current_level",
-            "refused",
-            f"the currents are {share:.3g} times the rated one",
-            float(share),
-            f"{LEAST_CURRENT:g} ... {LARGEST_CURRENT:g}",
-            "give the currents in ampere (probe factor, mA?), or correct the plate",
-        )
     per_hertz = abs(fundamental.voltage_v) / fundamental.frequency_hz
     rated = plate.rated_voltage_v * np.sqrt(2 / 3) / plate.rated_frequency_hz
-    if abs(per_hertz / rated * np.sqrt(3.0) - 1) < 0.05:
+    of_volts = voltage_level(float(per_hertz / rated), fundamental.frequency_hz / plate.rated_frequency_hz)
+    for level in (current_level(float(share)), of_volts):
+        if level is not None:
+            findings.add(level.code, "refused", level.what, level.value, level.limit, level.remedy)
+
+
+def of_mains(fundamental: Fundamental, findings: Findings) -> None:
+    """A note where the supply is near the mains' frequency, and not at it."""
+    if (said := off_mains(fundamental.frequency_hz)) is not None:
         findings.add(
-            "voltage_level",
-            "refused",
-            "the voltages are root three too small for this motor: phase voltages under the names of line-to-line ones?",
-            float(per_hertz / rated),
-            f"0.61 ... {LARGEST_FROM_HALF:g}",
-            "name the columns voltage_u_v, voltage_v_v, voltage_w_v, or correct the plate",
-        )
-    is_slow = fundamental.frequency_hz < 0.5 * plate.rated_frequency_hz
-    largest = LARGEST_VOLTS_PER_HERTZ if is_slow else LARGEST_FROM_HALF
-    if per_hertz > largest * rated:
-        findings.add(
-            "voltage_level",
-            "refused",
-            "the voltages are too large for this motor: line-to-line under the names of phase voltages, or peak for rms?",
-            float(per_hertz / rated),
-            largest,
-            "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
+            "clock_rate",
+            "note",
+            said,
+            fundamental.frequency_hz,
+            "50 or 60 Hz",
+            "check sample_period_s and the time column",
         )

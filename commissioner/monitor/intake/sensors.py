@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor.signals.supply import SupplyAngle, Vector, fundamental_phasor
+from commissioner.monitor.signals.supply import SupplyAngle, fundamental_phasor
 from commissioner.records import Signal
 
 GAIN_STD = 0.005
@@ -22,8 +22,6 @@ isolation amplifiers, transformers of class 1)."""
 LEAST_ASYMMETRY = 0.001
 LARGEST_ASYMMETRY = 0.03
 """Beyond it the sum of phase voltages is the mains' own zero sequence."""
-OPEN_SUM = 0.1
-"""Beyond it currents of a motor without a neutral are not what flows in its three lines: one of them a third off, at least."""
 STAYS_UNLIKE = 0.3
 """Of what the sum showed: the part that delays between channels have in it."""
 
@@ -48,8 +46,6 @@ class Evened:
     signals: tuple[Signal, ...]
     difference: Signal
     unlike: float
-    odd: tuple[int, float] | None = None
-    """The channel that spoils a sum which is far from zero and should not be, and its gain."""
 
 
 def evened(group: Sequence[Signal], sums_to_zero: bool, supply: SupplyAngle, period_s: float) -> Evened:
@@ -67,7 +63,7 @@ def evened(group: Sequence[Signal], sums_to_zero: bool, supply: SupplyAngle, per
     own = np.array([fundamental_phasor(signal - signal.mean(), angle) for signal in group])
     share = float(abs(own.sum()) / max(np.abs(own).sum(), 1e-12))
     if not sums_to_zero or share > LARGEST_ASYMMETRY:
-        return replace(unknown, unlike=share, odd=_odd_one(own) if sums_to_zero and share > OPEN_SUM else None)
+        return replace(unknown, unlike=share)
     gain = np.ones(3)
     for _ in range(4):
         even = own / gain
@@ -75,17 +71,6 @@ def evened(group: Sequence[Signal], sums_to_zero: bool, supply: SupplyAngle, per
     gain /= gain.mean()
     signals = tuple(signal / g for signal, g in zip(group, gain, strict=True))
     return Evened(signals, gain - 1, STAYS_UNLIKE * share)
-
-
-def _odd_one(own: Vector) -> tuple[int, float]:
-    """Of three phasors the one with which, scaled to what the other two leave for it, all three come out most alike."""
-    left = own.sum() - own
-    unlike = [
-        float(np.std(np.log(np.abs(np.append(np.delete(own, k), left[k]))))) + abs(float(np.angle(-own[k] / left[k])))
-        for k in range(own.size)
-    ]
-    odd = int(np.argmin(unlike))
-    return odd, float(abs(own[odd] / left[odd]))
 
 
 def trust_of(currents: Evened, voltages: Evened, supply: SupplyAngle) -> Trust:

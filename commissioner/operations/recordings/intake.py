@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
+from commissioner.motor.channels.rows import row_marks
 from commissioner.recordings.table import Table, to_standstill
 from commissioner.records import StandstillRecording
 from commissioner.settings import load_motor
 
-IN_A_ROW, MOST_SHARED = 32, 0.5
-"""Samples of the currents that are alike in a row only in copies; the part of the shorter recording that may be."""
-ODD = np.uint64(0x9E3779B97F4A7C15)
-"""Spreads the bits of a sample over its word: 2^64 over the golden ratio."""
+MOST_SHARED = 0.5
+"""Part of the shorter recording whose currents may be alike in a row of samples, as they are only in copies."""
 STANDSTILL_COLUMNS = frozenset(
     ["time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v"]
 )
@@ -61,17 +60,8 @@ def require_independent(tables: Sequence[Table]) -> None:
 def _rows(table: Table) -> NDArray[np.uint64]:
     """A number for every row of `IN_A_ROW` samples of the currents in which one flows, each once."""
     currents = [np.nan_to_num(x) for name, x in sorted(table.columns.items()) if name.startswith("current_")]
-    if not currents or currents[0].size < IN_A_ROW:
-        return np.zeros(0, np.uint64)
-    out, flows = np.zeros(currents[0].size, np.uint64), np.zeros(currents[0].size, bool)
-    for x in currents:
-        out = (out * ODD) ^ np.ascontiguousarray(x + 0.0).view(np.uint64)
-        flows |= x != 0.0
-    reach = 1
-    while reach < IN_A_ROW:
-        out ^= out >> np.uint64(29)
-        out, reach = out[:-reach] * ODD + out[reach:], 2 * reach
-    return np.unique(out[flows[: out.size]])
+    marks = row_marks(currents)
+    return np.unique(marks[np.any(currents, axis=0)[: marks.size]]) if marks.size else marks
 
 
 def require_one_motor(recordings: Sequence[StandstillRecording]) -> None:

@@ -25,7 +25,7 @@ from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
 
-SHORT = frozenset({"too_short", "too_few_periods"})
+SHORT = frozenset({"too_short", "missing_samples", "too_few_periods"})
 """Refusals of a stretch that is steady, but short."""
 SILENT = frozenset({"no_period", "no_shaft_line"})
 """Refusals of a stretch that is steady, but too even for the shaft to be seen: a fan, a pump, a healthy coupling."""

@@ -11,8 +11,8 @@ from commissioner.monitor.chain import Refused, Wishes, observe
 from commissioner.monitor.intake.audit import inspect, measure_fundamental
 from commissioner.monitor.intake.clock import hidden_jitter, whole_stretch
 from commissioner.monitor.intake.findings import Findings
-from commissioner.monitor.intake.levels import clipped_share
 from commissioner.monitor.signals.supply import follow_supply
+from commissioner.motor.channels.ends import clipped
 from commissioner.motor.running import from_nameplate
 from commissioner.operations.recordings.stretches import in_its_states
 from commissioner.records import RunningRecording
@@ -135,8 +135,8 @@ def test_clipped_channels_are_refused(group) -> None:
 
 def test_a_coarse_converter_is_not_taken_for_clipping() -> None:
     sine = np.sin(2 * np.pi * 50 * np.arange(80000) / 8000)
-    assert clipped_share(np.round(sine * 100) / 100) < 0.002
-    assert clipped_share(np.clip(sine, -0.95, 0.95)) > 0.1
+    assert clipped(np.round(sine * 100) / 100)[1] < 0.002
+    assert clipped(np.clip(sine, -0.95, 0.95))[1] > 0.1
 
 
 def test_scattered_lost_samples_are_refused_and_counted() -> None:

@@ -81,3 +81,42 @@ def test_a_whole_sample_may_lie_between_two_counts():
     coarse = replace(COUNTED, sample_period_s=0.05)
     assert coarse.judge(Counted(121, sent_s=105.20, answered_s=105.21)) is None
     assert coarse.judge(Counted(122, sent_s=105.20, answered_s=105.21)) is not None
+
+
+# --- a drive whose time is meant to pass faster ----------------------------------------------------------------------
+
+QUARTER = replace(BEGAN, sample_period_s=0.125)
+"""Numbers that are exact in binary."""
+
+
+def test_the_first_count_is_kept_and_pins_when_the_drive_began():
+    counted = BEGAN.counted(Counted(20, sent_s=100.5, answered_s=100.51))
+    assert counted == replace(BEGAN.at_most(20, 100.5), first=Counted(20, 100.5, 100.51))
+    assert counted.counted(Counted(70, sent_s=101.0, answered_s=101.01)).first == Counted(20, 100.5, 100.51)
+    assert counted.counted(Counted(70, sent_s=101.0, answered_s=101.01)).rate == 1.0
+
+
+def test_ages_are_of_the_drives_time_where_that_passes_four_times_as_fast():
+    first = QUARTER.counted(Counted(8, sent_s=101.0, answered_s=101.0))
+    fast = first.counted(Counted(40, sent_s=102.0, answered_s=102.0))  # 4 s of its time in 1 s
+    assert fast.rate == 4.0
+    assert fast.age_s(samples=40, now_s=102.0) == pytest.approx(0.125)  # the sample that was under way
+    assert fast.age_s(samples=40, now_s=102.5) == pytest.approx(2.0 + 0.125)
+    assert fast.age_s(samples=60, now_s=102.5) == 0.0
+    assert fast.at_most(56, sent_s=102.5).age_s(samples=56, now_s=102.5) == pytest.approx(0.125)
+    assert fast.counted(Counted(72, sent_s=103.0, answered_s=103.0)).rate == 4.0
+
+
+def test_what_was_pinned_before_the_rate_was_known_does_not_count():
+    first = QUARTER.counted(Counted(8, sent_s=101.0, answered_s=101.0)).at_most(0, sent_s=105.0)
+    fast = first.counted(Counted(40, sent_s=102.0, answered_s=102.0))
+    assert fast.began_after_s == 102.0 - 41 * 0.125 / 4.0
+
+
+@pytest.mark.parametrize(
+    ("samples", "answered_s", "rate"),
+    [(20, 102.0, 1.5), (19, 102.0, 1.0), (9, 101.0625, 1.0), (9, 101.1, 1.0), (10, 101.125, 2.0)],
+)
+def test_a_rate_is_told_from_half_as_fast_again_and_an_eighth_of_a_second_on(samples, answered_s, rate):
+    first = QUARTER.counted(Counted(8, sent_s=101.0, answered_s=101.0))
+    assert first.counted(Counted(samples, sent_s=101.0, answered_s=answered_s)).rate == pytest.approx(rate)

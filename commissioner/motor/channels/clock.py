@@ -1,0 +1,30 @@
+"""What the voltages say of the time column: the supply turns in its rows at a rate that the plate, or the mains, foretell."""
+
+from __future__ import annotations
+
+THOUSANDS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+NEAR = 2.0
+"""Factor between the plate's frequency and that of a supply which a thousand cannot be taken for."""
+MAINS_HZ = (50.0, 60.0)
+KEPT, LIKE_MAINS = 0.004, 0.03
+"""Share by which mains leave their frequency at most (EN 50160: 1 % in 99.5 % of a year, 0.4 % in any usual hour), and from which it is an inverter's."""
+
+
+def wrong_unit(supply_hz: float, rated_hz: float) -> str | None:
+    """The unit that the time column is in where that makes the supply's frequency, as the column tells it, like the plate's."""
+    if not supply_hz > 0.0:
+        return None
+    ratio = rated_hz / supply_hz
+    return next((unit for by, unit in THOUSANDS.items() if by / NEAR < ratio < by * NEAR), None)
+
+
+def off_mains(supply_hz: float) -> str | None:
+    """What to say of a supply that turns near the mains' frequency, and not at it."""
+    nearest = min(MAINS_HZ, key=lambda hz: abs(supply_hz / hz - 1.0))
+    off = supply_hz / nearest - 1.0
+    if not KEPT < abs(off) < LIKE_MAINS:
+        return None
+    return (
+        f"the supply turns at {supply_hz:.4g} Hz by the time column, {100.0 * off:+.1f} % from {nearest:g} Hz: if it is the mains, the sample "
+        f"period is {abs(100.0 * off):.1f} % too {'long' if off < 0.0 else 'short'}, and inductances, times and the inertia with it"
+    )
