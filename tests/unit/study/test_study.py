@@ -499,7 +499,7 @@ def test_what_is_refused_or_partial_is_not_counted_as_monitored(tmp_path):
     (tmp_path / "large.toml").write_text(PLATE.replace("= 2200", "= 22000").replace("= 5\n", "= 50\n"))
     assert watched(tmp_path, 'motors = ["mine.toml"]\n')["outcome"] == "partial"
     row = watched(tmp_path, 'motors = ["large.toml"]\n')
-    assert row["outcome"] == "rejected" and "do not belong to this plate" in row["reason"]
+    assert row["outcome"] == "rejected" and "0.1 times" in row["reason"]
 
 
 @pytest.mark.parametrize(("shape", "mean"), [("sine", 0.0), ("sawtooth", 0.15)])
