@@ -15,9 +15,15 @@ def plain_name(item: str) -> str:
     return item.replace("_", " ")
 
 
+_ENDINGS = (
+    ("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%"), ("_hz", "Hz"), ("_db", "dB"), ("_var", "var"), ("_w", "W"), ("_v", "V"),
+    ("_a", "A"),
+)  # fmt: skip
+
+
 def in_words(name: str) -> tuple[str, str]:
     """What it is and its unit: `load_torque_ripple_nm` as ("load torque ripple", "N m")."""
-    for ending, unit in (("_rad_per_s", "rad/s"), ("_nm", "N m"), ("_percent", "%")):
+    for ending, unit in _ENDINGS:
         if name.endswith(ending):
             return plain_name(name.removesuffix(ending)), unit
     return plain_name(name), ""

@@ -232,12 +232,25 @@ def read_toml(path: Path) -> JsonObject:
 def _slip(held: bytes, text: str) -> str:
     """The first line that is no TOML for a reason that people have, and how TOML writes it; nothing where none is found."""
     if held and not text:
-        kind = "is UTF-16, which Windows calls Unicode" if held.startswith(UTF_16) else "is in another encoding"
+        kind = (
+            "is UTF-16, which Windows calls Unicode"
+            if held.startswith(UTF_16)
+            else f"is in another encoding{_since(held)}"
+        )
         return f"; the file {kind}: save it as UTF-8"
     for number, line in enumerate(text.splitlines(), 1):
         for pattern, what, right in SLIPS:
             if (found := pattern.fullmatch(line.strip())) and not _is_toml(line):
                 return f"; in line {number} {what}: {right.format(**found.groupdict())}"
+    return ""
+
+
+def _since(held: bytes) -> str:
+    """The line of the first byte that is not UTF-8, counted as an editor does."""
+    try:
+        held.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        return f", seen in line {held[: error.start].count(10) + 1}"
     return ""
 
 

@@ -25,6 +25,15 @@ def visible(text: str) -> str:
     return text if text.isprintable() and text.isascii() else "".join(map(_visible, text))
 
 
+def is_sayable(text: str) -> bool:
+    """False where it holds bytes of another encoding, as half a character each: no file, database or page can hold them."""
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def shown(value: object, longest: int = LONGEST) -> str:
     """`str(value)` in one line of at most about `longest` characters, each of which only shows: ESC is `\\x1b`."""
     text = str(value)

@@ -7,6 +7,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
@@ -15,6 +16,7 @@ from typer.exceptions import TyperException
 from commissioner.cli.signals import be_deaf, listen
 from commissioner.errors import OF_DISK, Aborted, CommissionerError, DataRefused, DiskRefused, UsageError
 from commissioner.link.wire.secrets import Secrets, shown_call
+from commissioner.text import is_sayable, shown
 
 NO_ARGUMENTS = "NoArgsIsHelpError"
 """How the command line's library leaves a call without arguments: its message is the help."""
@@ -39,6 +41,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
 def _carried_out(app: typer.Typer, arguments: Sequence[str]) -> CommissionerError:
     """Why the verb could not be carried out; SystemExit where it could."""
     try:
+        _require_text(arguments)
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
         if code != INTERRUPTED:
             sys.exit(code)
@@ -66,6 +69,21 @@ def _carried_out(app: typer.Typer, arguments: Sequence[str]) -> CommissionerErro
     except Exception as surprise:
         error = _defect(surprise, arguments)
     return error
+
+
+def _require_text(arguments: Sequence[str]) -> None:
+    """UsageError: an argument of another encoding than this process's, as `Süd` typed in a Latin-1 terminal. A file or folder that
+    is there may have such a name; a tag or a serial number would be archived as another one."""
+    for argument in arguments:
+        if is_sayable(argument):
+            continue
+        path = Path(argument.partition("=")[2] if argument.startswith("--") and "=" in argument else argument)
+        if not path.exists() and not (is_sayable(path.name) and path.parent.is_dir()):
+            raise UsageError(
+                f"{shown(argument)} is no text here", step="command line", value=shown(argument),
+                limit=f"text in the encoding of this terminal's system, {sys.getfilesystemencoding()}",
+                remedy="set the terminal to that encoding, or write the word without the letters that are spelled out here",
+            )  # fmt: skip
 
 
 def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) -> None:
@@ -102,9 +120,14 @@ def _unanswered(arguments: Sequence[str]) -> CommissionerError:
     typer.echo(err=True)
     if sys.stdin is not None and sys.stdin.isatty():
         return _stopped(arguments, by="no answer")
+    instead = (
+        "`--yes` does not answer for what a person does at the drive"
+        if "--yes" in arguments
+        else "where nobody sits at one, `--yes` answers for those verbs that have it"
+    )
     return Aborted(
         "nobody answered", step=_verb(arguments), value="the end of the input", limit="an answer",
-        remedy="call it from a terminal; where nobody sits at one, `--yes` answers for those verbs that have it",
+        remedy=f"call it from a terminal; {instead}",
     )  # fmt: skip
 
 
@@ -130,7 +153,7 @@ def _defect(surprise: Exception, arguments: Sequence[str]) -> CommissionerError:
     """A defect of ours: the traceback goes to a file, the person gets a sentence."""
     try:
         with tempfile.NamedTemporaryFile(
-            "w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8"
+            "w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
         ) as file:
             file.write(Secrets(arguments).hide("".join(traceback.format_exception(surprise))))
         where = f"the file {file.name}"

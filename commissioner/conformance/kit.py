@@ -25,6 +25,8 @@ SILENT_RULES = 3
 """Rules in a row without any answer: the drive is gone, not wrong."""
 LEVEL = "a-bias-drives-a-current"
 """The rule that finds the voltage of the others."""
+IDENTITY = "magic-and-map-version"
+"""The first rule, always tried: the others write, and another device's registers are not ours."""
 WHO = ("drive_type", "serial_number", "firmware_version", "map_version")
 
 
@@ -93,7 +95,7 @@ def chosen(only: Collection[str]) -> tuple[Rule, ...]:
             remedy="give names of rules",
         )
     energises = any(rule.energises and rule.name in only for rule in RULES)
-    wanted = set(only) | ({*VITAL, LEVEL} if energises else set())
+    wanted = {*only, IDENTITY} | ({*VITAL, LEVEL} if energises else set())
     return tuple(rule for rule in RULES if not only or rule.name in wanted)
 
 
@@ -157,13 +159,15 @@ def _results(
 
 
 class _Obstacle:
-    """Why a rule is not tried: energising was not allowed, or the drive is not fit for it. Asks the drive once."""
+    """Why a rule is not tried: another device may be there, energising was not allowed, or the drive is not fit for it. Asks the drive once."""
 
     def __init__(self, drive: Drive, line: Line, results: list[RuleResult], *, energise: bool) -> None:
         self._drive, self._line, self._results, self._energise = drive, line, results, energise
         self._seen: str | None = None
 
     def __call__(self, rule: Rule) -> str:
+        if any(result.name == IDENTITY and result.outcome is not Outcome.PASS for result in self._results):
+            return f"nothing is written into what may be another device: {IDENTITY} did not pass"
         if not rule.energises:
             return ""
         if not self._energise:

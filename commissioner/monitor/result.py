@@ -230,7 +230,7 @@ def entry_of(observation: Observation, indicators: list[Indicator], source: str)
 def verdict_document(verdict: Verdict) -> TrendDocument:
     return {
         "state": verdict.state.name.lower(),
-        "sentence": verdict.state.value,
+        "sentence": verdict.sentence,
         "compared_with": verdict.compared_with,
         "alarms": list(verdict.names),
         "false_alarm_per_indicator": FALSE_ALARM,

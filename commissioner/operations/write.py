@@ -69,7 +69,7 @@ def restore(
     summary = request.find()
     if token is not None:
         check_token(plan_restore(summary, request.drive), token)
-    observe(Began("writing and reading back"))
+    observe(Began("proving the run, then writing and reading back"))
     done = write_snapshot(summary, request.drive, key=key)
     mark_restored(summary, key)
     return done

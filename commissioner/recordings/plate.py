@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +14,21 @@ from commissioner.monitor.machine.fit import PRIOR_FROM_COMMISSIONING, Start
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check, connection_of
 from commissioner.motor.running import equal_leakages
+from commissioner.records import ReadingNote
 
 MAX_RESULT_BYTES = 10_000_000
+SAME_INERTIA = 0.05
+"""Share by which two statements of one inertia may differ: load torque is known to no less."""
 
 
 def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None) -> Nameplate:
-    """The plate; `motor` (a name or a file) overrides the metadata. ConfigurationError names what is missing or wrong."""
+    """The plate; `motor` (a name or a file) overrides the metadata, but for an inertia that it does not
+    state. ConfigurationError names what is missing or wrong."""
     if motor is not None:
         from commissioner.settings import load_motor
 
-        return load_motor(motor)
+        plate, said = load_motor(motor), _inertia_of(metadata)
+        return plate if plate.inertia_kg_m2 is not None else replace(plate, inertia_kg_m2=said)
     for key in RATED_VALUES:
         if not isinstance(metadata.get(key), float):
             raise ConfigurationError(
@@ -34,16 +40,34 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
     values = {key: float(metadata[key]) for key in RATED_VALUES}
     pairs = metadata.get("pole_pairs")
     estimate = round(60 * values["rated_frequency_hz"] / max(values["rated_speed_rpm"], 1.0) - 0.02)
-    inertia = metadata.get("inertia_kg_m2")
     plate = Nameplate(
         **values,
         pole_pairs=int(pairs) if isinstance(pairs, float) else max(estimate, 1),
         connection=str(connection_of(metadata.get("connection", "star"))),
-        inertia_kg_m2=float(inertia) if isinstance(inertia, float) and inertia > 0 else None,
+        inertia_kg_m2=_inertia_of(metadata),
     )
     for problem in check(plate):
         raise ConfigurationError(file=source, key=problem.key, value=problem.value, expected=problem.expected)
     return plate
+
+
+def _inertia_of(metadata: Mapping[str, float | str]) -> float | None:
+    inertia = metadata.get("inertia_kg_m2")
+    return float(inertia) if isinstance(inertia, float) and inertia > 0 else None
+
+
+def inertia_overruled(metadata: Mapping[str, float | str], plate: Nameplate) -> tuple[ReadingNote, ...]:
+    """A note where `plate`, of a motor file, takes the place of another inertia that the recording states: the load torque is by it."""
+    said, taken = _inertia_of(metadata), plate.inertia_kg_m2
+    if said is None or taken is None or abs(said - taken) <= SAME_INERTIA * taken:
+        return ()
+    return (
+        ReadingNote(
+            "inertia_overruled",
+            f"the recording states an inertia of {said:.3g} kg m2, the motor file {taken:.3g}, which is taken: where the load's is to be in "
+            "it, give --inertia",
+        ),
+    )
 
 
 def has_no_plate(metadata: Mapping[str, float | str]) -> bool:

@@ -15,10 +15,10 @@ from commissioner.records import WATT_METERS, WINDINGS
 _VOLTS = r"(?:v|u|e|voltage|volts?|spannung|tension)"
 _AMPS = r"(?:i|current|amps?|strom|courant)"
 SHEET = {
-    "frequency_hz": re.compile(r"f|freq(?:uency)?|supplyfrequency|fs"),
+    "frequency_hz": re.compile(r"f|freq(?:uency)?f?|supplyfrequency|fs"),
     "voltage_line_v": re.compile(
         rf"{_VOLTS}(?:l|ll|line|linetoline|linevoltage|rms|eff|mean|avg)?|line(?:toline)?voltage|lltvoltage|terminalvoltage|appliedvoltage"
-        r"|(?:mean|average)(?:line)?voltage|meanspannung"
+        r"|(?:mean|average)(?:line)?voltage|meanspannung|(?:voltage|spannung|tension)[uv]"
     ),
     "voltage_neutral_v": re.compile(
         rf"{_VOLTS}(?:ln|phn|linetoneutral|phaseneutral|phasetoneutral|star)|(?:phase|line)(?:to)?neutral(?:voltage)?|star(?:voltage|spannung)"
@@ -27,20 +27,20 @@ SHEET = {
         rf"{_VOLTS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:voltage|volts|spannung|tension)|strangspannung"
     ),
     "current_line_a": re.compile(
-        rf"{_AMPS}(?:l|line|avg|mean|rms|eff)?|line(?:current|amps)|(?:mean|average)(?:line)?current|meanstrom"
+        rf"{_AMPS}(?:l|line|avg|mean|rms|eff)?|line(?:current|amps)|(?:mean|average)(?:line)?current|meanstrom|(?:current|strom|courant)i"
     ),
     "current_phase_a": re.compile(
         rf"{_AMPS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:current|amps|strom|courant)|strangstrom"
     ),
     "power_w": re.compile(
-        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)+power(?:total)?|powerinput|inputwatts"
+        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)+power(?:total)?|powerinput|inputwatts|power(?:in)?p"
     ),
     "power_phase_w": re.compile(
         r"p(?:ph|phase|perphase|str)|(?:active|input)?(?:power|leistung)(?:per|pro|je)?(?:phase|strang)|(?:phase|strang)(?:power|leistung)"
     ),
     "power_factor": re.compile(r"cos(?:ine)?(?:phi|φ|ϕ)?|pf|powerfactor|leistungsfaktor|λ|lambda"),
 }  # fmt: skip
-"""Line values, values of one phase, and the power of all phases. Values of each phase (`I_u`, `U_12`) are a recording's columns."""
+"""Line values, also with their own symbol behind the word (`Spannung U`, of which no `Spannung V` is beside it), values of one phase, and the power of all phases. Values of each phase (`I_u`, `U_12`) are a recording's columns."""
 FORMS = {
     "voltage_line_v": ("voltage_line_v", "voltage_neutral_v", "voltage_phase_v"),
     "current_line_a": ("current_line_a", "current_phase_a"),

@@ -17,16 +17,18 @@ def looked_at(case: Case) -> Row:
     began = time.process_time()
     row: dict[str, Any] = {"case": case.number, "file": Path(case.file).name, "outcome": "", "reason": ""}
     try:
-        row |= {"identify": _identified, "diagnose": _diagnosed, "monitor": _monitored}[case.kind](Path(case.file))
+        row |= {"identify": _identified, "diagnose": _diagnosed, "monitor": _monitored}[case.kind](
+            Path(case.file), case.motor or None
+        )
     except CommissionerError as error:
         row |= {"outcome": error.outcome, "reason": error.what}
     return cast("Row", row | {"cpu_s": time.process_time() - began})
 
 
-def _identified(path: Path) -> dict[str, Any]:
+def _identified(path: Path, motor: str | None) -> dict[str, Any]:
     from commissioner.operations.recordings.identify import IdentifyRequest, identify
 
-    document: Any = identify(IdentifyRequest((path,))).document
+    document: Any = identify(IdentifyRequest((path,), motor)).document
     told = {"outcome": document["outcome"], "reason": document["reason"], "remarks": "\n".join(document["remarks"])}
     for name in PARAMETERS:
         measured = (document.get("parameters") or {}).get(name, {})
@@ -34,10 +36,10 @@ def _identified(path: Path) -> dict[str, Any]:
     return told
 
 
-def _diagnosed(path: Path) -> dict[str, Any]:
+def _diagnosed(path: Path, motor: str | None) -> dict[str, Any]:
     from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 
-    document: Any = diagnose(DiagnoseRequest((path,))).document
+    document: Any = diagnose(DiagnoseRequest((path,), motor)).document
     causes = " ".join(cause["name"] for cause in document["causes"])
     return {
         "outcome": document["verdict"],
@@ -48,12 +50,15 @@ def _diagnosed(path: Path) -> dict[str, Any]:
     }
 
 
-def _monitored(path: Path) -> dict[str, Any]:
-    from commissioner.operations.recordings.monitor import MonitorRequest, monitor
+def _monitored(path: Path, motor: str | None) -> dict[str, Any]:
+    from commissioner.operations.recordings.monitor import MonitorRequest, NotMonitored, PartlyMonitored, monitor
 
-    document: Any = monitor(MonitorRequest(path)).document
+    seen = monitor(MonitorRequest(path, motor))
+    if isinstance(seen, NotMonitored):
+        raise seen.error
+    document: Any = seen.document
     return {
-        "outcome": "monitored", "remarks": "\n".join(finding["what"] for finding in document["audit"]["findings"]),
+        "outcome": "partial" if isinstance(seen, PartlyMonitored) else "monitored", "remarks": "\n".join(finding["what"] for finding in document["audit"]["findings"]),
         "mean_speed_rad_per_s": document["mean_speed_rad_per_s"],
         "mean_torque_nm": document["mean_torque_nm"],
     }  # fmt: skip

@@ -93,6 +93,17 @@ def _plate(name: str, path: Path, motors: Sequence[str]) -> Nameplate | None:
         ) from error  # fmt: skip
 
 
+def _plate_of_all(motors: Sequence[str], path: Path) -> str:
+    """The one plate that stands for every recording of a study, in place of what each says of its motor. UsageError: it is none."""
+    if len(motors) > 1:
+        raise ConfigurationError(
+            file=str(path), key="motors", value=", ".join(motors), expected="one plate for all recordings; a study file for each motor",
+        )  # fmt: skip
+    motor = _beside(motors[0], path, ())
+    load_motor(motor)
+    return motor
+
+
 def _of_files(study: Specification, path: Path) -> list[Case]:
     is_pattern = study.files and not Path(study.files).is_absolute()
     files = sorted(path.parent.glob(study.files)) if is_pattern else []
@@ -103,7 +114,8 @@ def _of_files(study: Specification, path: Path) -> list[Case]:
             value=study.files or None,
             expected="a pattern, relative to the study file, that fits recordings",
         )
+    motor = "" if study.motors == "all" else _plate_of_all(study.motors, path)
     return [
-        Case(number, study.seed, study.kind, "", 0.0, (), None, "file", (), (), str(name))
+        Case(number, study.seed, study.kind, motor, 0.0, (), None, "file", (), (), str(name))
         for number, name in enumerate(files)
     ]

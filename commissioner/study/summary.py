@@ -17,7 +17,7 @@ from commissioner.study.rows import Row
 
 COMMISSIONED = "commissioned"
 ANSWERED = frozenset(
-    {COMMISSIONED, "identified", "monitored", "explained", "nothing_significant", "not_distinguishable"}
+    {COMMISSIONED, "identified", "monitored", "partial", "explained", "nothing_significant", "not_distinguishable"}
 )
 """Outcomes of a case that came to what its kind asks for."""
 QUANTILES = (0.5, 0.95, 1.0)

@@ -196,7 +196,8 @@ class Line:
         self.server = self.make(int(self.address.rsplit(":", 1)[1])) if came_back else self.make()
         self.server.callback_new_connection = lambda: Handler(self.server, self)
         if not await self.server.listen():
-            raise OSError(f"cannot listen on {self.kind} {self.server.comm_params.source_address}")
+            instead = "" if self.is_rtu else ": another program may be there; port 0 takes any free one"
+            raise OSError(f"cannot listen on {self.kind} {self.server.comm_params.source_address}{instead}")
         if self.kind != "rtu":
             host, port = self.server.transport.sockets[0].getsockname()[:2]
             self.address = f"{host}:{port}"

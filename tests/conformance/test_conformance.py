@@ -72,7 +72,16 @@ def test_a_drive_of_another_identity_fails_by_name_with_exit_code_3():
     with SimProcess("--scenario", "wrong_identity", "--tcp", "0") as sim:
         answer = call("drives", "conformance", sim.url, "--energise", "--yes", "--json")
     assert answer.code == 3
-    assert outcomes(answer.json, Outcome.FAIL) & {"magic-and-map-version", "type-and-firmware"}
+    assert outcomes(answer.json, Outcome.FAIL) == {"magic-and-map-version"}
+    assert all(rule["requests"] == 0 for rule in answer.json["rules"][1:])
+
+
+def test_nothing_is_written_into_a_device_that_is_none_of_ours():
+    """The kit wrote 1, 1 over the first registers of whatever answered, as its rule of read-only items."""
+    with SimProcess("--scenario", "wrong_identity", "--tcp", "0") as sim:
+        answer = call("drives", "conformance", sim.url, "--rule", "read-only-items-stay", "--json")
+    tried = {rule["name"]: rule["requests"] > 0 for rule in answer.json["rules"]}
+    assert answer.code == 3 and tried == {"magic-and-map-version": True, "read-only-items-stay": False}
 
 
 def test_an_open_interlock_keeps_every_energising_rule_untried():

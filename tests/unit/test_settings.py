@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.link.files.drive_file import load_profile
-from commissioner.recordings.plate import plate_of
+from commissioner.recordings.plate import inertia_overruled, plate_of
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.service.configuration import ServiceFile
 from commissioner.service.routes.runs import RunWish
@@ -94,6 +94,26 @@ def test_a_byte_order_mark_of_windows_is_no_part_of_a_file(tmp_path):
     assert read_mapping(path).columns["CH1"].column == "current_u_a"
 
 
+def test_an_umlaut_of_another_encoding_is_told_with_its_line(tmp_path):
+    path = tmp_path / "motor.toml"
+    path.write_bytes(PLATE.encode() + "# Lüfter Süd\n".encode("latin-1"))
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(str(path))
+    assert f"in line {len(PLATE.splitlines()) + 1}: save it as UTF-8" in caught.value.limit
+
+
+def test_an_inertia_that_only_the_recording_states_stays_and_another_one_is_told(tmp_path):
+    """The manual's own example took 0.015 of the motor file for the 0.03 of motor and load, and said nothing: half the load torque."""
+    said = {"inertia_kg_m2": 0.03}
+    bare = "\n".join(line for line in PLATE.splitlines() if "inertia" not in line) + "\n"
+    assert plate_of(said, "x.csv", _motor(tmp_path, bare)).inertia_kg_m2 == 0.03
+    plate = plate_of(said, "x.csv", _motor(tmp_path, bare + "inertia_kg_m2 = 0.015\n"))
+    assert plate.inertia_kg_m2 == 0.015
+    (note,) = inertia_overruled(said, plate)
+    assert "0.03" in note.what and "0.015" in note.what and "--inertia" in note.what
+    assert inertia_overruled({"inertia_kg_m2": 0.0152}, plate) == inertia_overruled({}, plate) == ()
+
+
 def test_a_decimal_comma_is_told_with_its_line_and_the_point(tmp_path):
     current = next(line for line in PLATE.splitlines() if line.startswith("rated_current_a"))
     number = PLATE.splitlines().index(current) + 1
@@ -127,7 +147,8 @@ def test_a_line_that_people_write_in_place_of_toml_is_told_with_the_right_one(tm
 
 
 @pytest.mark.parametrize(
-    ("encoding", "told"), [("utf-16", "UTF-16, which Windows calls Unicode"), ("cp1252", "in another encoding")]
+    ("encoding", "told"),
+    [("utf-16", "UTF-16, which Windows calls Unicode"), ("cp1252", "in another encoding, seen in line 1")],
 )
 def test_a_file_in_another_encoding_is_to_be_saved_as_utf_8(tmp_path, encoding, told):
     path = tmp_path / "motor.toml"

@@ -44,7 +44,9 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
     if "tables" not in document:
         _one(document, is_on_page=out is not None)
     if out is not None:
-        screen.print(f"[dim]report[/] {escape(str(out))}", soft_wrap=True)
+        screen.print(
+            f"[dim]report[/] {escape(str(out if 'tables' in document else out / 'report.html'))}", soft_wrap=True
+        )
 
 
 def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:

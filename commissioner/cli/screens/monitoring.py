@@ -48,7 +48,9 @@ def show_partial(document: Mapping[str, Any]) -> None:
         if document[key] is not None:
             rows.append((label, quantity(document[key]["value"] * scale, document[key]["std"] * scale, unit)))
     rows += _beside(document)
-    rows += [(name.replace("_", " "), _indicated(value)) for name, value in document["indicators"].items()]
+    for name, value in document["indicators"].items():
+        said, unit = in_words(name)
+        rows.append((said, f"{_indicated(value)} {unit}".rstrip()))
     rows += [("modulates the current", f"{line['frequency_hz']:.4f} Hz") for line in document["periods"]]
     out.print(table("A partial answer", ("", ""), rows))
     withheld: dict[str, list[str]] = {}
@@ -120,7 +122,7 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
     if verdict is not None:
         colour = "red" if verdict.names else "green"
         out.print(
-            f"[{colour}]{verdict.state.value}[/]"
+            f"[{colour}]{verdict.sentence}[/]"
             + (": " + ", ".join(in_words(name)[0] for name in verdict.names) if verdict.names else "")
         )
     for name, path in document.get("files", {}).items():

@@ -45,4 +45,4 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
     for remark in document["remarks"]:
         screen.print(f"[dim]{escape(signs(remark))}[/]")
     if out is not None:
-        screen.print(f"[dim]report[/] {escape(str(out))}", soft_wrap=True)
+        screen.print(f"[dim]report[/] {escape(str(out / 'report.html'))}", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""All rules, in the order they are tried: what only asks first, what writes next, what energises last."""
+"""All rules, in the order they are tried: whether this is the map at all, what only asks first, what writes next, what energises last."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from commissioner.conformance.rules import (
 )
 
 RULES: tuple[Rule, ...] = (
+    *identity.RULES[:1],
     *protocol.RULES,
-    *identity.RULES,
+    *identity.RULES[1:],
     *supervision.RULES,
     *states.RULES,
     *parameters.RULES,

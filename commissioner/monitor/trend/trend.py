@@ -79,6 +79,12 @@ class Verdict:
     other_operating_points: int = 0
 
     @property
+    def sentence(self) -> str:
+        """The state, of too few also how many there are and are wanted."""
+        count = f": {self.compared_with}, of at least {LEAST_HISTORY}; --learn adds one"
+        return self.state.value + (count if self.state is State.TOO_FEW else "")
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Of the indicators that alarm."""
         return tuple(w.name for w in self.watched if w.alarms)

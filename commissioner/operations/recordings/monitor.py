@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import DataRefused, UsageError
@@ -28,7 +28,7 @@ from commissioner.operations.recordings.stretches import as_state, in_its_states
 from commissioner.operations.recordings.trust import trust_from
 from commissioner.recordings.baseline import update
 from commissioner.recordings.importers import contract_table, has_currents_only, require_running, with_few_voltages_said
-from commissioner.recordings.plate import has_no_plate, plate_of, start_from
+from commissioner.recordings.plate import has_no_plate, inertia_overruled, plate_of, start_from
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table, to_currents, to_running
 from commissioner.records import RunningRecording
@@ -106,6 +106,8 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | P
         return _without_plate(recording, request)
     plate = plate_of(recording.metadata, str(request.file), request.motor)
     start = start_from(request.start) if request.start else None
+    if request.motor is not None and request.inertia_kg_m2 is None:
+        recording = replace(recording, notes=(*recording.notes, *inertia_overruled(recording.metadata, plate)))
     observe(Began("looking for speed and load"))
     wishes = Wishes(request.load_hz, request.inertia_kg_m2, start, trust=trust_from(request.trust))
     whole = recording

@@ -59,7 +59,7 @@ def _headline(seen: Observation, verdict: Verdict | None) -> str:
         text = f"Check the probes: {' and '.join(_WIRING[f.code] for f in wiring)} (put right here, see the last section). {text}"
     if verdict is None:
         return text
-    return f"{text} Against its past: {verdict.state.value}{' (' + ', '.join(in_words(n)[0] for n in verdict.names) + ')' if verdict.names else ''}."
+    return f"{text} Against its past: {verdict.sentence}{' (' + ', '.join(in_words(n)[0] for n in verdict.names) + ')' if verdict.names else ''}."
 
 
 def _facts(seen: Observation, verdict: Verdict | None) -> list[tuple[str, str]]:

@@ -133,8 +133,8 @@ def _stamps_of(root: Path, names: Iterable[str]) -> Stamps:
 
 
 def place_of(root: Path) -> str:
-    """Which archive this is, where several share a database: the computer and the folder."""
-    return f"{machine_part()}:{root.absolute()}"
+    """Which archive this is, where several share a database: the computer and the folder, bytes that are no text spelled out."""
+    return f"{machine_part()}:{root.absolute()}".encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _on_file(root: Path, act: Callable[[Store], T]) -> T:

@@ -405,3 +405,45 @@ def test_a_list_loses_no_letter_of_a_word_wider_than_its_column(capsys):
     shown = narrow.file.getvalue()
     assert "…" not in shown and row[0] in shown
     assert sorted("".join(shown.split())) == sorted("".join(("run", "outcome", "drive", *row)).replace(" ", ""))
+
+
+def latin(text):
+    """As a terminal of another encoding hands it over."""
+    return text.encode("latin-1").decode("utf-8", "surrogateescape")
+
+
+@pytest.mark.parametrize("argument", ["Süd", "--tag=Süd", "tcp://süd"])
+def test_a_word_in_another_encoding_is_refused_before_anything_begins(capsys, argument):
+    """A run was made, and archived as one on `S?d`."""
+    code, said = leave(capsys, "run", "--tag", latin(argument))
+    assert code == 2 and said["error"]["step"] == "command line" and "is no text here" in said["reason"]
+    assert "udcfc" in said["error"]["value"] and "encoding" in said["error"]["remedy"]
+
+
+def test_a_folder_of_another_encoding_keeps_an_archive(capsys, tmp_path):
+    """What names no text is a folder all the same: the list is made, and its runs are found."""
+    runs = tmp_path / latin("Süd")
+    runs.mkdir()
+    assert leave(capsys, "runs", "list", "--runs", runs) == (0, {"runs": [], "total": 0})
+    assert leave(capsys, "runs", "index", "--rebuild", "--runs", runs)[0] == 0
+
+
+def test_a_defect_that_shows_no_text_is_reported_all_the_same(capsys):
+    code, said = leave(capsys, of=raising(ValueError(latin("Süd"))))
+    assert code == 5
+    report = pathlib.Path(said["error"]["remedy"].rpartition(" ")[2])
+    assert "udcfc" in report.read_text("utf-8")
+    report.unlink()
+
+
+def test_who_said_yes_is_not_sent_to_say_yes(capsys):
+    """An assisted tuning asks what `--yes` does not answer."""
+    asking = typer.Typer()
+
+    @asking.command()
+    def tune(yes: bool = typer.Option(False, "--yes"), as_json: bool = typer.Option(False, "--json")):
+        raise typer.Abort
+
+    code, said = leave(capsys, "--yes", of=asking)
+    assert code == 4 and "what a person does at the drive" in said["error"]["remedy"]
+    assert "`--yes` answers" in leave(capsys, of=asking)[1]["error"]["remedy"]

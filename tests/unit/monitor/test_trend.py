@@ -44,7 +44,9 @@ def test_noise_larger_than_claimed_widens_the_range() -> None:
 
 
 def test_fewer_than_three_recordings_give_no_verdict() -> None:
-    assert judge(entry(5.0), history(2)).state is State.TOO_FEW
+    verdict = judge(entry(5.0), history(2))
+    assert verdict.state is State.TOO_FEW
+    assert "2, of at least 3" in verdict.sentence
 
 
 def test_another_operating_point_is_not_compared() -> None:

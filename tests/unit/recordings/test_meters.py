@@ -268,3 +268,22 @@ def test_three_wattmeters_are_added_and_one_alone_is_asked_about(tmp_path: Path)
                 "locked rotor,15,25,27.9,306",
             )
         )
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Frequenz f [Hz]", "Spannung U [V]", "Strom I [A]", "Leistung P [W]"),
+        ("Frequency f (Hz)", "Voltage V (V)", "Current I (A)", "Power P (W)"),
+        ("Fréquence f [Hz]", "Tension U [V]", "Courant I [A]", "Puissance P [W]"),
+    ],
+)
+def test_a_quantity_with_its_own_symbol_is_no_phase(names):
+    """`Spannung U` of a test sheet was phase u's: sqrt(3) too many volts, beside `I` and `P`; `Strom I` was nothing."""
+    assert list(sheet_columns(names).values()) == ["frequency_hz", "voltage_line_v", "current_line_a", "power_w"]
+
+
+def test_beside_another_phase_it_is_one():
+    assert sheet_columns(["f [Hz]", "Spannung U [V]", "Spannung V [V]", "Spannung W [V]", "I", "P"]) == {
+        "f [Hz]": "frequency_hz", "I": "current_line_a", "P": "power_w",
+    }  # fmt: skip

@@ -464,6 +464,44 @@ def test_a_torn_row_is_told_with_its_file_and_in_the_row_of_a_study(tmp_path, mo
     assert looked_at(case)["remarks"] == f"{note}\nanother"
 
 
+PLATE = (
+    "rated_power_w = 2200\nrated_voltage_v = 400\nrated_frequency_hz = 50\nrated_current_a = 5\nrated_speed_rpm = 1436\npower_factor = 0.8\n"
+    'pole_pairs = 2\nconnection = "star"\n'
+)
+
+
+def watched(tmp_path, text, name="a.csv"):
+    """The row of a recording of 0.5 s: a motor at its rated voltage, current and power factor."""
+    t = np.arange(2500) / 5000
+    noise = np.random.default_rng(1).standard_normal((6, t.size))
+    volts = [326.6 * np.sin(2 * np.pi * (50 * t - k / 3)) for k in range(3)] + 0.3 * noise[:3]
+    amps = [7.07 * np.sin(2 * np.pi * (50 * t - k / 3) - np.arccos(0.8)) for k in range(3)] + 0.02 * noise[3:]
+    rows = [",".join(f"{x:.6f}" for x in row) for row in np.stack([t, *amps, *volts], axis=1)]
+    names = "time_s,current_u_a,current_v_a,current_w_a,voltage_u_v,voltage_v_v,voltage_w_v"
+    (tmp_path / name).write_text("\n".join([names, *rows]))
+    path = study_file(tmp_path, f'kind = "monitor"\nfiles = "{name}"\n{text}')
+    (case,) = cases_of(load(path, Specification), path, ())
+    return looked_at(case)
+
+
+def test_recordings_without_a_plate_get_the_studys(tmp_path):
+    """The key was taken and not read; every file of a scope was refused, with a remedy that a study has not."""
+    (tmp_path / "mine.toml").write_text(PLATE)
+    assert watched(tmp_path, 'motors = ["mine.toml"]\n')["reason"] == ""
+    with pytest.raises(ConfigurationError, match="motors"):
+        watched(tmp_path, 'motors = ["mine.toml", "motor_2kw2"]\n')
+    with pytest.raises(UsageError):
+        watched(tmp_path, 'motors = ["nobodys"]\n')
+
+
+def test_what_is_refused_or_partial_is_not_counted_as_monitored(tmp_path):
+    (tmp_path / "mine.toml").write_text(PLATE)
+    (tmp_path / "large.toml").write_text(PLATE.replace("= 2200", "= 22000").replace("= 5\n", "= 50\n"))
+    assert watched(tmp_path, 'motors = ["mine.toml"]\n')["outcome"] == "partial"
+    row = watched(tmp_path, 'motors = ["large.toml"]\n')
+    assert row["outcome"] == "rejected" and "0.1 times" in row["reason"]
+
+
 @pytest.mark.parametrize(("shape", "mean"), [("sine", 0.0), ("sawtooth", 0.15)])
 def test_the_true_values_are_those_behind_the_links_mean(shape, mean):
     """The sawtooth lies 15 % of its size above the nominal link: more voltage than commanded, smaller impedances. Intervals held the

@@ -35,7 +35,7 @@ def restore_run(
     if not yes:
         _show_plan(write.planned_restore(request), as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
-    with screen.busy("writing and reading back"):
+    with screen.busy("proving the run, then writing and reading back"):
         done = write.restore(request, token, key=read_key(seal) if seal is not None else None)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
@@ -73,7 +73,7 @@ def write_run(
     if not yes:
         _show_plan(shown, as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
-    with screen.busy("proving the result, writing and reading back"):
+    with screen.busy("proving the result, then writing and reading back"):
         done = write.write_run(
             request, shown.token if token is None else token, read_key(seal) if seal is not None else None
         )
