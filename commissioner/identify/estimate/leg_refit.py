@@ -29,7 +29,7 @@ from commissioner.records import Signal
 WORTH = 0.003
 """Relative standard error of R_s above which the law is looked for."""
 MOST_KNEE = 0.17
-"""Of the largest current, the knee of the free curve from where on no law is told from another by the samples: a motor of a tenth of its drive,
+"""Of the largest current, where the free curve has 63 % of its loss, from where on no law is told from another by the samples: a motor of a tenth of its drive,
 0.25, was given R_s 16 % off as of 0.9 %; at 0.13 (a fifth) it is right to 0.2 %."""
 LIKELY, MOST_TRIED, MOST_KEPT = 25.0, 6, 4
 """Pairs tried on the samples: those whose curves are this near the best in chi-square, and how many; then, how many of
