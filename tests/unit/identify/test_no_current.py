@@ -23,7 +23,9 @@ def recorded(carried=1.0, seed=1, noise_a=0.02, step_a=0.0, offset_a=0.0):
     whole = linear_current(TRUTH, voltage, PERIOD_S)
     axis = np.concatenate([whole, carried * whole])
     cosines = np.array(phase_cosines(0.0))[:, None]
-    phases = cosines * axis + noise_a * rng.standard_normal((3, axis.size)) + offset_a * np.array([[1.0], [-0.7], [0.4]])
+    phases = (
+        cosines * axis + noise_a * rng.standard_normal((3, axis.size)) + offset_a * np.array([[1.0], [-0.7], [0.4]])
+    )
     if step_a:
         phases = step_a * np.round(phases / step_a)
     time_s = np.concatenate([np.arange(whole.size), 60_000 + np.arange(whole.size)]) * PERIOD_S

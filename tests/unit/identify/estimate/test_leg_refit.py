@@ -58,7 +58,9 @@ def test_no_law_is_believed_whose_knee_spans_the_test(monkeypatch, knee_share, i
     curve, tried = LegLaw(2.0), []
     values = 7.0 * np.tanh(curve.knots_a / (knee_share * curve.largest_a))
     model = SimpleNamespace(leg=curve, leg_slice=slice(1, None), leg_size=curve.size)
-    unsure = SimpleNamespace(model=model, theta=np.append(8.0, values), covariance=np.eye(1), sum_of_squares=1.0, noise_a=1.0)
+    unsure = SimpleNamespace(
+        model=model, theta=np.append(8.0, values), covariance=np.eye(1), sum_of_squares=1.0, noise_a=1.0
+    )
     monkeypatch.setattr(leg_refit, "_on_first_test", lambda *_: tried.append(True) or [])
     drawn = leg_refit.with_known_law([unsure], [[]], [unsure], [SimpleNamespace(misfit=1.0)])
     assert drawn == [unsure] and bool(tried) is is_tried
