@@ -222,7 +222,9 @@ def test_a_speed_next_to_the_synchronous_one_is_doubted(motor):
     synchronous_rpm = 60.0 * motor.plate.rated_frequency_hz / motor.plate.pole_pairs
     said = plate_doubt(dataclasses.replace(motor.plate, rated_speed_rpm=0.9993 * synchronous_rpm))
     assert "not the synchronous one" in said and "a slip of 0.0007" in said
-    doubted_from = 1.0 - LEAST_SLIP_OF_LOSSES * (1.0 - typical_efficiency(motor.plate.rated_power_w, motor.plate.pole_pairs))
+    doubted_from = 1.0 - LEAST_SLIP_OF_LOSSES * (
+        1.0 - typical_efficiency(motor.plate.rated_power_w, motor.plate.pole_pairs)
+    )
     assert plate_doubt(dataclasses.replace(motor.plate, rated_speed_rpm=(doubted_from - 1e-6) * synchronous_rpm)) == ""
 
 
