@@ -37,6 +37,11 @@ SURELY_OTHERWISE = 2.45
 """From which factor on it is said to be that: below sqrt(6) a current scale of 2 is no less likely. The geometric mean of the impedances and
 of the current's inverse is 2.67 ... 3.35 in the table but for five motors, whose plates are a factor of 1.26 ... 1.7 off."""
 
+HALVES = 4.0
+"""The same between the halves of a winding in series and in parallel, as of a motor for 230/460 V; nearer than the other connection from the
+geometric mean of both on: 3.46."""
+COUNT_AND_SCALE = "how many motors are connected (two have half the impedances), and the current sensors' scale"
+
 
 @dataclass(frozen=True)
 class PlateMatch:
@@ -91,7 +96,8 @@ def mismatch(match: PlateMatch, plate: Nameplate) -> PlateMismatch | None:
     if match.copper_loss_ratio > 1.0:
         return PlateMismatch(
             "the stator's copper loss at rated current exceeds all the losses the plate allows",
-            match.copper_loss_ratio, "1", "check that --motor is the motor at the drive, and the current sensors' scale",
+            match.copper_loss_ratio, "1",
+            "check that --motor is the motor at the drive, the resistance of cable and contacts, which is in R_s, and the current sensors' scale",
         )  # fmt: skip
     return None
 
@@ -150,18 +156,31 @@ def _of_scale(
         return PlateMismatch(
             what, value, limit,
             f"all impedances are {impedances:.2g} times what the plate's motor has: check that --motor is the motor at the drive, its "
-            "connection (factor 3), and the current sensors' scale",
+            f"connection (factor 3), of a motor for two voltages as 230/460 V how the halves of its winding are joined (factor 4), {COUNT_AND_SCALE}",
         )  # fmt: skip
-    other, factor = ("star", "three times") if plate.connection == "delta" else ("delta", "a third of")
-    if wired_otherwise >= SURELY_OTHERWISE:
+    other, factor, halves, said = _OTHERWISE[plate.connection]
+    if wired_otherwise >= math.sqrt(OTHER_CONNECTION * HALVES):
+        what = (
+            f"the motor is wired in {other} where the plate says {plate.connection}, or with the halves of its winding {halves} where "
+            f"the plate's voltage is that of halves {said}: all its impedances are {impedances:.2g} times the plate's"
+        )
+    elif wired_otherwise >= SURELY_OTHERWISE:
         what = f"the motor is wired in {other} where the plate says {plate.connection}: all its impedances are {factor} the plate's"
     else:
         what = f"the motor may be wired in {other} where the plate says {plate.connection}, or its currents are off in scale: {what}"
     return PlateMismatch(
         what, value, limit,
-        f"wire the motor in {plate.connection}, or give the plate's {other} values; if the wiring is right, check the "
-        "current sensors' scale",
+        f"wire the motor in {plate.connection}, or give the plate's {other} values; of a motor for two voltages as 230/460 V see how the halves of "
+        f"its winding are joined; if the wiring is right, check {COUNT_AND_SCALE}",
     )  # fmt: skip
+
+
+_OTHERWISE = {
+    "delta": ("star", "three times", "in series", "in parallel"),
+    "star": ("delta", "a third of", "in parallel", "in series"),
+}
+"""By what the plate says: the other connection, its impedances over the plate's, how the halves of a winding are joined that looks like it, and
+what the plate says then."""
 
 
 SCALE = (0.70, 1.58)

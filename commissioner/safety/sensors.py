@@ -47,6 +47,8 @@ FLOWED, GONE_S = 60.0, 0.12
 beside as much voltage, has stopped: where it changes its sign, it stays there for 0.05 s at half a hertz."""
 AS_MUCH = 0.95
 """Of the voltage, in the root mean square, that drove such currents: what an inverter loses may take all of a smaller one."""
+PARTS = 16
+"""Of a window: where in it a phase opened is told to one of them."""
 CABLE = "isolate the supply, then check motor cable, terminals and contactor"
 TURNING = "see that the shaft stands still, for one that turns makes currents beside the axis, too; "
 
@@ -158,17 +160,12 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
     worst one's rms distance from the axis' pattern. A coarse converter shows one and the same number of an open phase, too."""
     cosines = np.array(phase_cosines(axis_deg))[: seen.shape[0]]
     current = seen - zero.offset_a[:, None]
-    along = cosines @ current / float(cosines @ cosines)
-    size_a, noise_a = _rms(along), SIGMAS * float(np.max(zero.noise_a))
-    rest = np.sqrt(np.mean(np.square(current - np.outer(cosines, along)), axis=1))
+    noise_a = SIGMAS * float(np.max(zero.noise_a))
+    size_a, rest = _beside(current, cosines)
     allowed = MISFIT * size_a + noise_a + step_a
     is_off = float(np.max(rest)) > allowed
-    without = _open_phase(current, cosines, size_a, QUIET / SIGMAS * noise_a + step_a) if is_off else None
-    if without is not None:
-        return StopReason(
-            f"phase {NAMES[without]} carries no current, what flows goes through the other two: it is open", _rms(current[without]),
-            f"{abs(cosines[without]) * size_a:.3g} A", CABLE, unit="A",
-        )  # fmt: skip
+    if is_off and (opened := _opened(current, cosines, noise_a, step_a)) is not None:
+        return opened
     top_v, moved_v = peak(voltage_v), float(np.ptp(voltage_v))
     moves = min(moved_v, top_v) * size_a * np.abs(cosines) > STEPS * step_a * top_v
     still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & moves
@@ -183,6 +180,34 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
         f"the current sensor of phase {_culprit(current, cosines)} does not follow the test axis",
         float(np.max(rest)), f"at most {allowed:.3g} A beside the axis", TURNING + CHECK,
     )  # fmt: skip
+
+
+def _beside(current: Signal, cosines: Signal) -> tuple[float, Signal]:
+    """Rms of what flows along the axis, and of what each phase shows beside it, `(phases,)`."""
+    along = cosines @ current / float(cosines @ cosines)
+    return _rms(along), np.sqrt(np.mean(np.square(current - np.outer(cosines, along)), axis=1))
+
+
+def _opened(current: Signal, cosines: Signal, noise_a: float, step_a: float) -> StopReason | None:
+    """A phase that is open in the whole window, or from somewhere in it on and follows the axis before: of a shaft that turns, whose currents
+    pass each phase's zero, too, they do not."""
+    rows, quiet_a = current.shape[1], QUIET / SIGMAS * noise_a + step_a
+    part = max(rows // PARTS, 1)
+    for count in range(rows, part - 1, -part):
+        last = current[:, rows - count :]
+        size_a, _ = _beside(last, cosines)
+        phase = _open_phase(last, cosines, size_a, quiet_a)
+        if phase is None:
+            continue
+        if (before := current[:, : max(rows - count - part, 0)]).size:
+            along_a, rest = _beside(before, cosines)
+            if float(np.max(rest)) > MISFIT * along_a + noise_a + step_a:
+                return None
+        return StopReason(
+            f"phase {NAMES[phase]} carries no current, what flows goes through the other two: it is open", _rms(last[phase]),
+            f"{abs(cosines[phase]) * size_a:.3g} A", CABLE, unit="A",
+        )  # fmt: skip
+    return None
 
 
 def _open_phase(current: Signal, cosines: Signal, size_a: float, noise_a: float) -> int | None:

@@ -62,7 +62,7 @@ class SampleRing:
         oldest = max(self.first_kept, self.produced - self.capacity)
         self.overruns += max(0, oldest - self.next_unread)
         first = max(wanted, oldest)
-        first, count = self._around_gaps(first, max(0, min(samples, self.produced - first)))
+        first, count = self._around_gaps(first, samples)
         self.next_unread = max(self.next_unread, oldest, first + count)
         words, header = np.zeros(self.map.window_words, np.int64), self.map.window_header_words
         seen = int(copy_samples(self.ring, self.flags, first, count, self.mask, words[header:]))
@@ -84,14 +84,11 @@ class SampleRing:
                 index = start + length
         return index
 
-    def _around_gaps(self, first: int, count: int) -> tuple[int, int]:
-        """Fault knob: samples the drive lost; a window ends before them or starts behind them."""
-        for start, length in self.gaps:
-            if start <= first < start + length:
-                count, first = max(0, first + count - start - length), start + length
-            elif first < start < first + count:
-                count = start - first
-        return first, min(count, max(0, self.produced - first))
+    def _around_gaps(self, first: int, samples: int) -> tuple[int, int]:
+        """(first, count) of up to so many samples. Fault knob: samples the drive lost; a window ends before them or starts behind them."""
+        first = self.behind_gaps(first)
+        count = min(samples, self.produced - first, *(start - first for start, _ in self.gaps if start > first))
+        return first, max(0, count)
 
     def _flags(self, end: int, *, was_overrun: bool, is_running: bool) -> int:
         names = self.map.flags

@@ -6,6 +6,9 @@ import time
 
 import pytest
 
+from sim.drive.drive_map import load_map
+from sim.drive.samples import SampleRing
+from sim.physics import layout as at
 from sim.scenario import load
 from sim.wire.faults import DRIVE, SERVER, WIRE, FaultError, parse
 from sim.wire.server import run_in_thread
@@ -220,6 +223,22 @@ def test_sample_gap_shows_as_a_window_that_begins_later_than_asked(with_faults):
             late.append(begins - asked)
         asked = begins + window[3]
     assert late == [5]
+
+
+@pytest.mark.parametrize("length", [5, 40, 200])
+def test_behind_a_gap_longer_than_a_window_samples_go_on(length):
+    """Windows at and in a gap of more than a window's samples stayed empty for good, which ended every run as a drive that sends none."""
+    ring = SampleRing(load_map(), 1024, 0b1111, 1)
+    ring.has_ended = False
+    ring.c[at.C_PRODUCED], ring.gaps = 500, [(100, length)]
+    asked, seen = 0, []
+    while asked < 500:
+        window = ring.window(asked, 29, 1, 0, is_running=True)
+        begins = window[1] << 16 | window[2]
+        assert window[3] > 0
+        seen += range(begins, begins + window[3])
+        asked = begins + window[3]
+    assert seen == [*range(100), *range(100 + length, 500)]
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ def require_conditioned(batch: BatchFit) -> None:
             value=f"relative standard error {relative[worst]:.0%}",
             limit=f"{WORST_RELATIVE_STD:.0%}",
             remedy="excite more tones between the machine's poles, or record longer; the fit's impedance at 1 Hz is "
-            f"{impedance[0]:.4g} ohm, at 10 Hz {impedance[1]:.4g} ohm",
+            f"{impedance[0]:.4g} ohm, at 10 Hz {impedance[1]:.4g} ohm; hold the shaft still: a cage that turns fast hides L_M",
         )
 
 

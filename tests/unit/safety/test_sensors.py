@@ -372,6 +372,56 @@ def test_an_open_phase_is_named_as_one_and_is_no_sensors_fault(phase, axis_deg):
     assert float(reason.limit.removesuffix(" A")) == pytest.approx(asked_a, rel=0.2)
 
 
+def opening(phase, row, axis_deg=0.0):
+    """As `single_phase`, from this row on; before it sound currents."""
+
+    def damage(seen, start):
+        forth, back = (other for other in range(3) if other != phase)
+        through = (seen[forth] - seen[back]) / 2.0
+        out = seen.copy()
+        is_open = start + np.arange(seen.shape[1]) >= row
+        out[forth, is_open], out[back, is_open], out[phase, is_open] = (
+            through[is_open],
+            -through[is_open],
+            NOISE[0, start : start + seen.shape[1]][is_open],
+        )
+        return out
+
+    return verdict(axis_deg=axis_deg, peak_a=8.0, damage=damage, offset=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(("phase", "axis_deg"), [(1, 0.0), (0, 60.0), (2, 120.0)])
+@pytest.mark.parametrize("row", range(405, 600, 15))
+def test_a_phase_that_opens_in_a_test_is_named_wherever_in_a_window(row, phase, axis_deg):
+    """A window that holds both had accused a sensor: from 0.06 of it on a misfit shows, and the whole of it is no open phase."""
+    reason = opening(phase, row, axis_deg)
+    assert (
+        reason is not None
+        and reason.what.startswith(f"phase {'uvw'[phase]} carries no current")
+        and not reason.is_fault
+    )
+    assert reason.value < 0.3 * float(reason.limit.removesuffix(" A"))
+
+
+@pytest.mark.parametrize("rad_per_s", [40.0, -40.0, 150.0, 400.0])
+@pytest.mark.parametrize("since_s", np.linspace(0.07, 0.1, 7))
+def test_currents_that_turn_away_from_the_axis_are_no_open_phase(rad_per_s, since_s):
+    """Of a turning shaft: their sum is nothing, and one after the other passes its zero, also at the end of a window."""
+
+    def damage(seen, start):
+        time_s = (start + np.arange(seen.shape[1])) * PERIOD_S
+        angle = rad_per_s * np.maximum(time_s - since_s, 0.0)
+        return (
+            2.0
+            / 3.0
+            * (seen[0] - seen[1] / 2.0 - seen[2] / 2.0)
+            * np.array([np.cos(angle - 2.0 * np.pi / 3.0 * k) for k in range(3)])
+        )
+
+    reason = verdict(peak_a=8.0, damage=damage, offset=(0.0, 0.0, 0.0))
+    assert reason is not None and "does not follow the test axis" in reason.what
+
+
 def single_phase_size(phase, axis_deg, peak_a):
     """Current along the axis, rms of a sine, that flows through the two other phases, as half their difference drives it."""
     cosines = phase_cosines(axis_deg)

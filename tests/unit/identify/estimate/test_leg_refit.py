@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from commissioner.identify.analysis import identify
+from commissioner.identify.estimate import leg_refit
+from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.leg_pair import DEAD_TIME, THRESHOLD, PairLaw
 from sim.physics.inductance import inverse_gamma
 from sim.recordings.standstill import record
@@ -47,6 +50,20 @@ def test_values_no_inverter_has_are_brought_back():
     kept = LAW.admissible(np.array([10.0, -1.0, 30.0, 2.0]))
     assert np.all(kept[:2] > 0.0)
     assert np.all(np.abs(kept[2:]) <= kept[:2])
+
+
+@pytest.mark.parametrize(("knee_share", "is_tried"), [(0.02, True), (0.17, True), (0.3, False), (0.4, False)])
+def test_no_law_is_believed_whose_knee_spans_the_test(monkeypatch, knee_share, is_tried):
+    """A drive of ten times the motor: R_s 16 % off, as of 0.9 %, and commissioned."""
+    curve, tried = LegLaw(2.0), []
+    values = 7.0 * np.tanh(curve.knots_a / (knee_share * curve.largest_a))
+    model = SimpleNamespace(leg=curve, leg_slice=slice(1, None), leg_size=curve.size)
+    unsure = SimpleNamespace(
+        model=model, theta=np.append(8.0, values), covariance=np.eye(1), sum_of_squares=1.0, noise_a=1.0
+    )
+    monkeypatch.setattr(leg_refit, "_on_first_test", lambda *_: tried.append(True) or [])
+    drawn = leg_refit.with_known_law([unsure], [[]], [unsure], [SimpleNamespace(misfit=1.0)])
+    assert drawn == [unsure] and bool(tried) is is_tried
 
 
 def first_test():
