@@ -14,7 +14,7 @@ def kernels():
     return {f"{d.py_func.__module__}.{d.py_func.__name__}": len(d.signatures) for d in gc.get_objects() if isinstance(d, Dispatcher)}
 
 def libraries():
-    return {name for name in sys.modules if name.partition(".")[0] in ("scipy", "numba", "pydantic")}
+    return {name for name in sys.modules if name.partition(".")[0] in ("scipy", "pydantic")}  # numba's own are asked for by the simulator's kernels, too
 
 begun, imported, in_memory = {}, set(), study._in_memory
 study._in_memory = lambda *given: begun.update(kernels()) or imported.update(libraries()) or in_memory(*given)

@@ -20,6 +20,8 @@ JUMPS_ON, LEAST_TURNS, MOST_LOST = 0.35, 4.0, 20
 """rad, and usual steps, by which a voltage turns on at once where rows are lost; more such places are pulses."""
 IN_A_ROW, MOST_REPEATED = 32, 0.5
 """Rows that are alike in all channels only in a copy; part of a recording from which it repeats itself by nature (computed, without noise)."""
+PRINTED = 1e-4
+"""Of a channel's largest value, by which numbers written with few digits differ."""
 ODD = np.uint64(0x9E3779B97F4A7C15)
 """Spreads the bits of a sample over its word: 2^64 over the golden ratio."""
 
@@ -82,8 +84,14 @@ def written_twice(channels: Sequence[Signal], flows: NDArray[np.bool_]) -> tuple
     back = copies - first_of[copies]
     cuts = np.flatnonzero((np.diff(copies) != 1) | (np.diff(back) != 0)) + 1
     a, b = max(pairwise([0, *cuts.tolist(), copies.size]), key=lambda span: span[1] - span[0])
-    begin = int(copies[a])
-    return begin, int(copies[b - 1]) + IN_A_ROW, begin - int(back[a])
+    begin, apart = int(copies[a]), int(back[a])
+    return None if _repeats_itself(channels, apart) else (begin, int(copies[b - 1]) + IN_A_ROW, begin - apart)
+
+
+def _repeats_itself(channels: Sequence[Signal], apart: int) -> bool:
+    """Whether all of it stood so many rows before, but for the digits that were printed: computed, without noise."""
+    off = ((np.abs(x[apart:] - x[:-apart]), PRINTED * np.abs(x).max()) for x in channels)
+    return all(float(np.median(moved)) <= least for moved, least in off)
 
 
 def row_marks(channels: Sequence[Signal]) -> NDArray[np.uint64]:
@@ -92,6 +100,7 @@ def row_marks(channels: Sequence[Signal]) -> NDArray[np.uint64]:
         return np.zeros(0, np.uint64)
     out = np.zeros(channels[0].size, np.uint64)
     for x in channels:
+        out ^= out >> np.uint64(31)  # or the signs of two channels that turn round together would cancel
         out = (out * ODD) ^ np.ascontiguousarray(x + 0.0).view(np.uint64)
     reach = 1
     while reach < IN_A_ROW:

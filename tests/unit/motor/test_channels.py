@@ -11,6 +11,7 @@ from commissioner.motor.channels.clock import off_mains
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.faults import no_lines, put_on_time, put_right
 from commissioner.motor.channels.late import late, shifted
+from commissioner.motor.channels.rows import written_twice
 from commissioner.records import StandstillRecording
 from sim.motoring.recording import record
 from tests.running_effects.cases import Case, as_plate, as_recording, taken
@@ -322,3 +323,10 @@ def test_samples_too_far_apart_tell_no_delay():
     ]
     assert late(lines, 4e-4) is not None
     assert late(lines, 7e-4) is None
+
+
+def test_the_other_half_of_a_period_is_no_copy():
+    time_s = np.arange(600) / 5000.0
+    lines = [np.cos(2.0 * np.pi * 50.0 * time_s - k * 2.0944) for k in range(6)]
+    half = [np.where(time_s < 0.01, x, -np.roll(x, 50)) for x in lines]  # to the bit, as no noise would leave it
+    assert written_twice([x[:100] for x in half], np.ones(100, bool)) is None
