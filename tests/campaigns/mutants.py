@@ -32,6 +32,7 @@ TARGETS = {
     "commissioner.motor.plate_match": (
         "tests/unit/motor/test_plate_match.py",
         "tests/unit/motor/test_plate_scale.py",
+        "tests/unit/motor/test_joined_otherwise.py",
     ),
     "commissioner.procedure.states": ("tests/unit/procedure/test_states.py",),
 }
@@ -75,6 +76,14 @@ EXPLAINED = {
         "-phases.sum(axis=0) -> phases.sum(axis=0)",
     ): "only the magnitude of the third phase is looked at",
     ("commissioner.safety.sensors", "self._gone_s < GONE_S"): ROUNDED,
+    (
+        "commissioner.safety.sensors",
+        "float(np.max(rest)) > MISFIT * along_a + noise_a + step_a -> float(np.max(rest)) >= ",
+    ): ROUNDED,
+    (
+        "commissioner.motor.plate_match",
+        "wired_otherwise >= math.sqrt(OTHER_CONNECTION * HALVES) -> wired_otherwise > ",
+    ): ROUNDED,
     ("commissioner.safety.sensors", "size_a > FLOWED * noise_a + self._step_a -> size_a >= "): ROUNDED,
     ("commissioner.safety.sensors", "size_a > SIGMAS * noise_a + self._step_a -> size_a >= "): ROUNDED,
     ("commissioner.safety.sensors", "volts_v >= AS_MUCH * drove_v -> volts_v > "): ROUNDED,

@@ -8,7 +8,17 @@ import pytest
 
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.records import SampleBlock
-from commissioner.safety.sensors import MISFIT, WINDOW_S, ZERO_S, SensorWatch, _culprit, _misfit, _smallest_step, _Zero
+from commissioner.safety.sensors import (
+    MISFIT,
+    WINDOW_S,
+    ZERO_S,
+    SensorWatch,
+    _culprit,
+    _misfit,
+    _opened,
+    _smallest_step,
+    _Zero,
+)
 from tests.unit.safety.test_watch import STATUS
 
 PERIOD_S, LIMIT_A, ROWS = 2e-4, 10.0, 50
@@ -555,3 +565,26 @@ def test_the_smallest_step_is_between_any_two_values_of_one_phase():
     assert _smallest_step(seen, 0.0) == pytest.approx(0.3)
     assert _smallest_step(seen, 0.2) == 0.2
     assert _smallest_step(np.ones((3, 4)), 0.0) == 0.0
+
+
+def opened_at(rows, open_rows, beside_a=0.0):
+    """Currents of axis 0, 1 A along it and `beside_a` across it, in the last rows through u and w alone, `(3, rows)`."""
+    seen = np.tile([[1.0], [-0.5 + beside_a], [-0.5 - beside_a]], rows)
+    seen[:, rows - open_rows :] = [[1.0], [0.0], [-1.0]]
+    return seen
+
+
+def opened(seen, noise_a=0.0, step_a=0.0):
+    return _opened(seen, np.array(phase_cosines(0.0)), noise_a, step_a)
+
+
+@pytest.mark.parametrize(("rows", "open_rows"), [(160, 10), (160, 160), (16, 1), (240, 15), (10, 1)])
+def test_a_phase_that_is_open_in_the_last_sixteenth_is_found(rows, open_rows):
+    reason = opened(opened_at(rows, open_rows))
+    assert reason is not None and reason.what.startswith("phase v carries no current")
+
+
+def test_before_a_phase_opens_the_currents_follow_the_axis_but_for_noise_and_a_step():
+    allowed = {"noise_a": 0.02, "step_a": 0.01}
+    assert opened(opened_at(160, 80, MISFIT + 0.025), **allowed) is not None
+    assert opened(opened_at(160, 80, MISFIT + 0.035), **allowed) is None
