@@ -568,9 +568,9 @@ def test_the_smallest_step_is_between_any_two_values_of_one_phase():
 
 
 def opened_at(rows, open_rows, beside_a=0.0):
-    """Currents of axis 0, 1 A along it and `beside_a` across it, in the last rows through u and w alone, `(3, rows)`."""
-    seen = np.tile([[1.0], [-0.5 + beside_a], [-0.5 - beside_a]], rows)
-    seen[:, rows - open_rows :] = [[1.0], [0.0], [-1.0]]
+    """Currents of axis 0, 2 A along it and `beside_a` across it, in the last rows through u and w alone, `(3, rows)`."""
+    seen = np.tile([[2.0], [-1.0 + beside_a], [-1.0 - beside_a]], rows)
+    seen[:, rows - open_rows :] = [[2.0], [0.0], [-2.0]]
     return seen
 
 
@@ -586,5 +586,5 @@ def test_a_phase_that_is_open_in_the_last_sixteenth_is_found(rows, open_rows):
 
 def test_before_a_phase_opens_the_currents_follow_the_axis_but_for_noise_and_a_step():
     allowed = {"noise_a": 0.02, "step_a": 0.01}
-    assert opened(opened_at(160, 80, MISFIT + 0.025), **allowed) is not None
-    assert opened(opened_at(160, 80, MISFIT + 0.035), **allowed) is None
+    assert opened(opened_at(160, 80, 2.0 * MISFIT + 0.025), **allowed) is not None
+    assert opened(opened_at(160, 80, 2.0 * MISFIT + 0.035), **allowed) is None
