@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.estimation.fit import Machine, Problem, residuals, simulate
+from commissioner.running.residual.shaft_lines import frame_of_voltage
 
 Array = NDArray[np.float64]
 ORDERS = (1, 2)
@@ -24,7 +25,7 @@ STANDS_OUT = 100.0
 """Of the median power of the searched range, from which a line is one: a fit anew takes as long as the first."""
 BESIDE_BINS = 4
 """About the supply's own frequency, where an offset has its line."""
-RATED_ALIKE = 0.01
+ALIKE = 0.01
 """Of the slip, within which the fit's own shaft is that of the line already."""
 
 
@@ -41,21 +42,16 @@ def slips_of(problem: Problem, machine: Machine) -> Slips | None:
     record, best, found = problem.record, STANDS_OUT, None
     whitened = residuals(problem, machine)
     for w, rest, (_, shaft) in zip(record.windows, whitened, simulate(problem, machine), strict=True):
-        voltage = w.voltage[::2] @ np.array([1.0, 1j])
-        fed = np.abs(voltage) > 0.0
-        turn_rad = np.unwrap(np.angle(voltage[fed]))
-        if turn_rad.size < rest.shape[0] // 2 or turn_rad.size < 2:
+        frame, turn = frame_of_voltage(w)
+        if np.count_nonzero(frame) < max(rest.shape[0] // 2, 2) or not turn > 0.0:
             continue
-        supply_hz = abs(turn_rad[-1] - turn_rad[0]) / (2.0 * np.pi * (turn_rad.size - 1) * problem.period)
-        seen = np.where(
-            fed, (rest[:, 0] + 1j * rest[:, 1]) * np.conj(voltage / np.maximum(np.abs(voltage), 1e-12)), 0.0
-        )
+        supply_hz, seen = turn / problem.period, (rest[:, 0] + 1j * rest[:, 1]) * np.conj(frame)
         line = _strongest(seen, problem.period, supply_hz, record.scales.pole_pairs, record.plate.rated_slip)
         if line is None or line[0] < best:
             continue
         turns_hz = float(np.mean(np.abs(shaft[:, 0]))) / (2.0 * np.pi)
         best, found = line[0], Slips(line[1], 1.0 - turns_hz / supply_hz)
-    if found is None or not found.fitted > 0.0 or abs(found.shown / found.fitted - 1.0) < RATED_ALIKE:
+    if found is None or not found.fitted > 0.0 or abs(found.shown / found.fitted - 1.0) < ALIKE:
         return None
     return found
 

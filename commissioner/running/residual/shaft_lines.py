@@ -59,16 +59,23 @@ def without_shaft_lines(
     return out, tuple(sorted(lines, key=lambda line: -line.sigma))
 
 
-def _cleaned(w: Window, rest: Array, turns_hz: float, period_s: float) -> tuple[Array, dict[int, float]]:
-    """The window's rest without its lines, and the square sum that each multiple had."""
+def frame_of_voltage(w: Window) -> tuple[Spectrum, float]:
+    """(unit vector of the voltage at each sample, 0 where there is none; turns a sample)."""
     voltage = w.voltage[::2] @ np.array([1.0, 1j])
     frame = voltage / np.maximum(np.abs(voltage), 1e-12)
+    turned = frame[1:] * np.conj(frame[:-1])
+    return frame, abs(float(np.sum(np.angle(turned)))) / (2.0 * np.pi * max(int(np.count_nonzero(turned)), 1))
+
+
+def _cleaned(w: Window, rest: Array, turns_hz: float, period_s: float) -> tuple[Array, dict[int, float]]:
+    """The window's rest without its lines, and the square sum that each multiple had."""
+    frame, turn = frame_of_voltage(w)
     spectrum: Spectrum = np.fft.fft((rest[:, 0] + 1j * rest[:, 1]) * np.conj(frame))
     n = spectrum.size
+    supply = turn * n
     power = np.abs(spectrum) ** 2 / n
     usual = float(np.median(power)) / np.log(2.0)
     bins = np.fft.fftfreq(n, 1.0 / n)
-    supply = abs(float(np.sum(np.angle(frame[1:] * np.conj(frame[:-1]))))) / (2.0 * np.pi)
     peaks = _peaks(power, STANDS_OUT * usual * np.log(2.0))
     of_supply = np.abs(bins[peaks] / supply - np.round(bins[peaks] / supply)) * supply
     peaks = peaks[(of_supply > BESIDE_BINS) & (np.abs(bins[peaks]) < (MOST_PER_TURN + 0.5) * turns_hz * n * period_s)]
