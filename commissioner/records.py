@@ -78,7 +78,8 @@ class SampleBlock:
     `current_*_a[k]` is sampled at `(first_index + k) * sample_period_s`; `voltage_axis_v[k]` is the mean voltage
     commanded along the axis over the period that starts there. Where `averaged` > 1 control periods make a sample, all of
     its values are means over them (currents of the control periods' starts). `age_s`: how old the last sample can have been, at
-    most, when it arrived (`safety.freshness`).
+    most, when it arrived (`safety.freshness`). `unit_v`, `unit_a`: of one of the drive's counts, where every value is a whole
+    number of them (16 bits); 0: not known.
     """
 
     session: int
@@ -94,6 +95,8 @@ class SampleBlock:
     clipped: bool = False
     age_s: float = 0.0
     averaged: int = 1
+    unit_v: float = 0.0
+    unit_a: float = 0.0
 
     @property
     def count(self) -> int:

@@ -199,4 +199,6 @@ def _block(packed: bytes, header: dict[str, int], stream: StreamFormat, lost: in
         lost_before=lost,
         clipped=is_clipped,
         averaged=stream.averaged,
+        unit_v=stream.voltage_scale_v,
+        unit_a=stream.current_scale_a,
     )

@@ -19,6 +19,7 @@ from commissioner.procedure.link_plan import BITS_PER_REGISTER, OVERHEAD_BITS, S
 from commissioner.procedure.plan import Job, ProcedurePlan
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
+from commissioner.run.stream import GATHER_S
 from commissioner.safety.commands import ALL_CHANNELS
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
@@ -61,7 +62,9 @@ def make_job(
     names, factors = names_of(profile)
     pace = _pace(inverter, now_s)
     latency_s = port.stats.latency_s(1.0)
-    sample_to_command_s = 0.0 if pace is None else WINDOWS * pace.round_trip_s + latency_s
+    sample_to_command_s = 0.0
+    if pace is not None:
+        sample_to_command_s = WINDOWS * pace.round_trip_s + max(GATHER_S - pace.round_trip_s, 0.0) + latency_s
     return Job(
         plan=plan,
         nameplate=nameplate,

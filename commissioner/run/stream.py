@@ -19,6 +19,9 @@ EMPTY_FETCH_PAUSE_S = 0.002
 """Wait after a window without new samples: a drive in real time needs a moment."""
 LATE_S = 0.05
 """A sample that may be older than this: the drive is asked how many it has made, as often as this at the most."""
+GATHER_S, FILLED = 0.004, 0.7
+"""A request costs both sides the same however few samples it brings: after one that left none behind, the next is sent when
+so much of a window can be there, or so long after it. Never a whole window: its last sample need not be the newest."""
 WINDOWS = 2.0
 """Over a slow link even the newest sample is older, by this many times what its window took to come."""
 ROOM = 1.2
@@ -41,6 +44,7 @@ class Stream:
         self._inverter, self._cursor, self._watch = inverter, cursor, watch
         self._clock = DriveClock(began_s, cursor.stream.sample_period_s)
         self._asked_s, self._took_s = -math.inf, 0.0
+        self._not_before_s = -math.inf
         self._waiting: SampleBlock | None = None
 
     def next_block(self, longest_s: float) -> SampleBlock | None:
@@ -86,7 +90,10 @@ class Stream:
         return status
 
     def _await_block(self, longest_s: float) -> SampleBlock | None:
-        deadline = self._inverter.now_s() + longest_s
+        asked_s = self._inverter.now_s()
+        deadline = asked_s + longest_s
+        if asked_s < self._not_before_s:
+            self._inverter.sleep(self._not_before_s - asked_s)
         while True:
             asked_s = self._inverter.now_s()
             if asked_s > deadline:
@@ -115,7 +122,14 @@ class Stream:
             return None
         if block.count < (most or self._cursor.stream.samples_per_window) and not (self.is_over or window.has_ended):
             self._pin(Counted(self._cursor.next_index, asked_s, asked_s + self._took_s))
+            self._not_before_s = asked_s + min(GATHER_S, self._window_s)
         return block
+
+    @property
+    def _window_s(self) -> float:
+        """What filling a window to `FILLED` takes, on our clock."""
+        stream = self._cursor.stream
+        return FILLED * stream.samples_per_window * stream.sample_period_s / self._clock.rate
 
     def _pin(self, counted: Counted) -> None:
         stop_if(self._clock.judge(counted))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.records import SampleBlock
@@ -23,10 +24,14 @@ MARK = b"BLK1"
 _FRAME = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
 _HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
 _AGE, _AVERAGED = struct.Struct("<d"), struct.Struct("<H")  # behind the signals, where the flags say so
-_CLIPPED, _HAS_W, _HAS_AGE, _IS_AVERAGED = 1, 2, 4, 8
+_UNITS = struct.Struct("<dd")  # before the signals, where these are whole numbers of the drive's counts
+_CLIPPED, _HAS_W, _HAS_AGE, _IS_AVERAGED, _IN_COUNTS = 1, 2, 4, 8, 16
 LARGEST_BLOCK = 1 << 20
 """Payload bytes; the largest window of a drive makes 4 kB."""
 
+COUNTS = np.iinfo(np.int16)
+
+Values = NDArray[np.float64]
 Placed = tuple[int, SampleBlock]
 """Segment and block."""
 
@@ -139,14 +144,37 @@ def _encode(block: SampleBlock, segment: int) -> bytes:
     flags = _HAS_AGE | (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
     flags |= _IS_AVERAGED if block.averaged > 1 else 0
     tail = _AGE.pack(block.age_s) + (_AVERAGED.pack(block.averaged) if block.averaged > 1 else b"")
-    header = _HEADER.pack(
-        segment, block.session, block.first_index, block.count, block.lost_before, block.sample_period_s,
-        block.axis_deg, block.dc_link_v, flags,
-    )  # fmt: skip
+
+    def header(flags: int) -> bytes:
+        return _HEADER.pack(
+            segment, block.session, block.first_index, block.count, block.lost_before, block.sample_period_s,
+            block.axis_deg, block.dc_link_v, flags,
+        )  # fmt: skip
+
     signals = [block.voltage_axis_v, block.current_u_a, block.current_v_a]
     if block.current_w_a is not None:
         signals.append(block.current_w_a)
-    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals) + tail
+    values = np.stack(signals).astype("<f8")
+    counts = _counts(values, block.unit_v, block.unit_a)
+    if counts is None:
+        return header(flags) + values.tobytes() + tail
+    return header(flags | _IN_COUNTS) + _UNITS.pack(block.unit_v, block.unit_a) + counts.tobytes() + tail
+
+
+def _counts(values: Values, unit_v: float, unit_a: float) -> NDArray[np.int16] | None:
+    """(channels, n) in the drive's counts, a quarter of the bytes; None where that is not bit by bit what the values are."""
+    if unit_v <= 0.0 or unit_a <= 0.0:
+        return None
+    units = _units(len(values), unit_v, unit_a)
+    counts = np.rint(values / units)
+    if not np.all((counts >= COUNTS.min) & (counts <= COUNTS.max)):
+        return None
+    whole = counts.astype("<i2")
+    return whole if (whole * units).tobytes() == values.tobytes() else None
+
+
+def _units(channels: int, unit_v: float, unit_a: float) -> Values:
+    return np.array([[unit_v], *[[unit_a]] * (channels - 1)])
 
 
 def _decode(payload: bytes) -> Placed:
@@ -154,19 +182,25 @@ def _decode(payload: bytes) -> Placed:
         raise _no_block(len(payload), f"at least {_HEADER.size} bytes")
     segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
     channels = 4 if flags & _HAS_W else 3
-    signals_end = _HEADER.size + 8 * channels * count
+    in_counts = bool(flags & _IN_COUNTS)
+    signals_at = _HEADER.size + _UNITS.size * in_counts
+    signals_end = signals_at + (2 if in_counts else 8) * channels * count
     has_age, is_averaged = bool(flags & _HAS_AGE), bool(flags & _IS_AVERAGED)
     averaged_at = signals_end + _AGE.size * has_age
     if len(payload) != averaged_at + _AVERAGED.size * is_averaged:
         raise _no_block(len(payload), f"{channels} signals of {count} samples")
-    numbers = np.frombuffer(payload, "<f8", channels * count, _HEADER.size)
-    signals = numbers.reshape(channels, count).astype(np.float64)
+    numbers = np.frombuffer(payload, "<i2" if in_counts else "<f8", channels * count, signals_at).reshape(
+        channels, count
+    )
+    unit_v, unit_a = _UNITS.unpack_from(payload, _HEADER.size) if in_counts else (0.0, 0.0)
+    signals = numbers * _units(channels, unit_v, unit_a) if in_counts else numbers.astype(np.float64)
     return segment, SampleBlock(
         session=session, first_index=first, sample_period_s=period, axis_deg=axis, voltage_axis_v=signals[0],
         current_u_a=signals[1], current_v_a=signals[2], current_w_a=signals[3] if flags & _HAS_W else None,
         dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
         age_s=_AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0,
         averaged=_AVERAGED.unpack_from(payload, averaged_at)[0] if is_averaged else 1,
+        unit_v=unit_v, unit_a=unit_a,
     )  # fmt: skip
 
 

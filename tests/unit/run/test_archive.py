@@ -7,6 +7,7 @@ import sqlite3
 import stat
 import threading
 from contextlib import closing, nullcontext
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,6 +79,23 @@ def test_every_sample_comes_back_bit_for_bit(folder):
     assert [segment for segment, _ in blocks] == [0, 0]
     assert np.array_equal(blocks[0][1].current_u_a, _block(0).current_u_a)
     assert blocks[1][1].current_w_a is None
+
+
+def test_what_a_drive_counted_is_kept_in_its_counts_and_comes_back_bit_for_bit(folder):
+    unit_v, unit_a = 0.0171, 1e-3 / 3
+    counts = np.array([-32768, -1, 0, 7, 32767]).repeat(6)
+    signals = {"voltage_axis_v": counts * unit_v, **{f"current_{phase}_a": counts * unit_a for phase in "uvw"}}
+    block = replace(_block(0, counts.size), **signals, unit_v=unit_v, unit_a=unit_a)
+    other = replace(block, current_v_a=block.current_v_a + 1e-9)
+    minus_zero = replace(block, current_v_a=np.copysign(block.current_v_a, -1.0))
+    sizes = []
+    for given in (block, other, minus_zero):
+        folder.append(given, 0)
+        sizes.append((folder.path / "blocks.bin").stat().st_size)
+    for (_, read), given in zip(read_blocks(folder.path / "blocks.bin"), (block, other, minus_zero), strict=True):
+        for name in signals:
+            assert getattr(read, name).tobytes() == getattr(given, name).tobytes(), name
+    assert sizes[0] < 0.4 * (sizes[1] - sizes[0])
 
 
 @pytest.mark.parametrize("cut", [1, 5, 12, 40, 300, 900])

@@ -214,6 +214,17 @@ def test_a_link_that_has_become_slower_than_its_samples_is_seen_before_eight_mor
     assert age_s < 0.5 + 4 * 0.12  # at the most three windows and a status after the one that was still young enough
 
 
+@pytest.mark.parametrize(("took_s", "least", "most"), [(1e-4, 6, 9), (1e-3, 6, 10), (6e-3, 11, 13)])
+def test_a_fast_link_is_asked_for_samples_that_are_worth_asking_and_never_for_more_than_a_window(
+    monkeypatch, took_s, least, most
+):
+    drive = Full(took_s)
+    stream = streamed(drive, monkeypatch)
+    counts = [stream.next_block(0.5).count for _ in range(100)][2:]
+    assert all(least <= count <= most for count in counts)  # of 16: each ends with the newest sample there was
+    assert stream._clock.first is not None
+
+
 @pytest.mark.parametrize("took_s", [0.001, 0.002, 0.004, 0.0075, 0.012])
 def test_a_host_that_was_behind_catches_up_in_one_go(monkeypatch, took_s):
     block = streamed(Full(took_s, behind_s=0.15), monkeypatch).next_block(0.5)
