@@ -145,6 +145,17 @@ class Record:
     def channel(self, name: str) -> int:
         return self.channel_names.index(name)
 
+    def shown(self, k: int, channel: int) -> float:
+        """Sum over segment `k` of the squared voltage times a channel: how much the command would show of it. Summed once."""
+        key = k, channel
+        if key not in self._shown:
+            self._shown[key] = float(self.segments[k].voltage_axis_v ** 2 @ self.channels[k][:, channel])
+        return self._shown[key]
+
+    @cached_property
+    def _shown(self) -> dict[tuple[int, int], float]:
+        return {}
+
     def with_channels(self, *named: Named) -> Record:
         """The record with more known functions of time appended: names, and one array (n_k, len(names)) per segment, each.
 

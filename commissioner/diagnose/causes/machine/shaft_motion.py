@@ -54,13 +54,13 @@ class ShaftMotion(Cause):
 
     def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Root mean square over the time in which the command would show it: without flux a speed leaves no trace."""
+        record = setting.record
         power, weight = 0.0, 0.0
-        for segment, channels in zip(setting.record.segments, setting.record.channels, strict=True):
-            shown = segment.voltage_axis_v**2
+        for k, segment in enumerate(record.segments):
             for name, value in values.items():
                 spline, _, uid = name.rpartition("_")
                 if uid == str(segment.uid) and spline.startswith(SPEED_SPLINE):
-                    mine = float(shown @ channels[:, setting.record.channel(spline)])
+                    mine = record.shown(k, record.channel(spline))
                     power, weight = power + mine * value**2, weight + mine
         return {"speed_rad_per_s": (float(np.sqrt(power / weight)) if weight else 0.0, "rad/s")}
 
