@@ -20,14 +20,17 @@ from numpy.typing import NDArray
 from commissioner.errors import DataRefused
 from commissioner.records import SampleBlock
 
-MARK = b"BLK1"
+MARK, PACKED = b"BLK1", b"BLKZ"
+"""Of a frame, and of one whose payload is deflated (RFC 1951)."""
+MARKS = b"BLK"
 _FRAME = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
 _HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
 _AGE, _AVERAGED = struct.Struct("<d"), struct.Struct("<H")  # behind the signals, where the flags say so
 _UNITS = struct.Struct("<dd")  # before the signals, where these are whole numbers of the drive's counts
 _CLIPPED, _HAS_W, _HAS_AGE, _IS_AVERAGED, _IN_COUNTS = 1, 2, 4, 8, 16
+_FLAGS_AT = _HEADER.size - 1
 LARGEST_BLOCK = 1 << 20
-"""Payload bytes; the largest window of a drive makes 4 kB."""
+"""Payload bytes, unpacked; the largest window of a drive makes 4 kB."""
 
 COUNTS = np.iinfo(np.int16)
 
@@ -59,8 +62,10 @@ class BlockDamage:
 
 def frame(block: SampleBlock, segment: int) -> bytes:
     """The bytes that `blocks.bin` takes for the block."""
-    payload = _encode(block, segment)
-    return _FRAME.pack(MARK, len(payload), zlib.crc32(payload)) + payload
+    mark, payload = MARK, _encode(block, segment)
+    if payload[_FLAGS_AT] & _IN_COUNTS:
+        mark, payload = PACKED, zlib.compress(payload, wbits=-zlib.MAX_WBITS)
+    return _FRAME.pack(mark, len(payload), zlib.crc32(payload)) + payload
 
 
 def append_frame(descriptor: int, record: bytes, written: int) -> None:
@@ -89,8 +94,8 @@ def follow_blocks(path: Path, offset: int, most: int) -> list[tuple[int, Placed]
         data = file.read()
     found: list[tuple[int, Placed]] = []
     at = 0
-    while len(found) < most and (payload := _payload(data, at)) is not None:
-        at += _FRAME.size + len(payload)
+    while len(found) < most and (whole := _payload(data, at)) is not None:
+        payload, at = whole
         found.append((offset + at, _decode(payload)))
     return found
 
@@ -99,11 +104,11 @@ def _walk(data: bytes, damage: list[BlockDamage]) -> Iterator[Placed]:
     at = 0
     after: tuple[int, int] | None = None
     while at < len(data):
-        payload = _payload(data, at)
-        if payload is not None:
+        whole = _payload(data, at)
+        if whole is not None:
+            payload, at = whole
             segment, block = _decode(payload)
             yield segment, block
-            at += _FRAME.size + len(payload)
             after = segment, block.first_index + block.count
             continue
         end = _next_whole(data, at + 1)
@@ -111,33 +116,45 @@ def _walk(data: bytes, damage: list[BlockDamage]) -> Iterator[Placed]:
         if following is None:
             damage.append(BlockDamage(at, len(data) - at, after, None, True))
             return
-        segment, block = _decode(following)
+        payload, next_at = following
+        segment, block = _decode(payload)
         lost = block.first_index - after[1] if after is not None and after[0] == segment else None
         damage.append(BlockDamage(at, end - at, after, lost, False))
         yield segment, block if lost is None else replace(block, lost_before=max(lost, block.lost_before))
-        at = end + _FRAME.size + len(following)
+        at = next_at
         after = segment, block.first_index + block.count
 
 
 def _next_whole(data: bytes, at: int) -> int:
     """Where the next whole frame begins at `at` or later; the end of the data where there is none."""
-    while (at := data.find(MARK, at)) >= 0:
+    while (at := data.find(MARKS, at)) >= 0:
         if _payload(data, at) is not None:
             return at
         at += 1
     return len(data)
 
 
-def _payload(data: bytes, at: int) -> bytes | None:
-    """The payload of the whole frame at `at`; None where there is none."""
+def _payload(data: bytes, at: int) -> tuple[bytes, int] | None:
+    """The payload of the whole frame at `at`, unpacked, and where the frame ends; None where there is none."""
     if at + _FRAME.size > len(data):
         return None
     mark, size, check = _FRAME.unpack_from(data, at)
     start = at + _FRAME.size
-    if mark != MARK or size > LARGEST_BLOCK or start + size > len(data):
+    if mark not in (MARK, PACKED) or size > LARGEST_BLOCK or start + size > len(data):
         return None
     payload = data[start : start + size]
-    return payload if zlib.crc32(payload) == check else None
+    if zlib.crc32(payload) != check:
+        return None
+    return (payload if mark == MARK else _unpacked(payload)), start + size
+
+
+def _unpacked(payload: bytes) -> bytes:
+    """DataRefused: a frame whose check sum is right holds what is none of ours."""
+    unpacking = zlib.decompressobj(-zlib.MAX_WBITS)
+    try:
+        return unpacking.decompress(payload, LARGEST_BLOCK)
+    except zlib.error as error:
+        raise _no_block(len(payload), f"a deflated block ({error})") from error
 
 
 def _encode(block: SampleBlock, segment: int) -> bytes:
