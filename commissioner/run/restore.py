@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError
+from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError, WriteBackFailed
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import archived_profile
@@ -18,11 +18,12 @@ from commissioner.records import ParameterSnapshot, WrittenParameter, plain_name
 from commissioner.registers.codec import held_words
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
+from commissioner.report.run.standing import Held
 from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
-from commissioner.run.archive.summary import RunSummary
+from commissioner.run.archive.summary import CALLED_OFF, RunSummary
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -90,7 +91,7 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
             with Mastery(inverter, lock) as mastery:
                 mastery.take(inverter.identify())
-                report = _bring_back(inverter, snapshot, lines, journal)
+                report = _bring_back(inverter, snapshot, lines, journal, run.held)
         note(journal, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
     return Restored(
         run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored, report.fault
@@ -98,12 +99,17 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
 
 
 def _bring_back(
-    inverter: Inverter, snapshot: ParameterSnapshot, lines: list[dict[str, Any]], journal: RunFolder
+    inverter: Inverter, snapshot: ParameterSnapshot, lines: list[dict[str, Any]], journal: RunFolder, before: Held
 ) -> WriteReport:
+    """The snapshot, into the drive. `before`: what was known of it; of a drive that was seen to hold that still, it is known again."""
     present = inverter.snapshot().in_use
     _check_known(present, snapshot, inverter.profile, lines)
     try:
         return inverter.restore(snapshot, present)
+    except WriteBackFailed as failed:
+        if failed.is_as_found:
+            note(journal, CALLED_OFF, failed.as_dict() | {"held": before.value})
+        raise
     except OSError as failure:
         raise write_lost(failure, journal) from failure
 

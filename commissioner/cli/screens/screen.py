@@ -150,6 +150,15 @@ def table(
     return made
 
 
+def stacked_rows(rows: Iterable[Sequence[str]]) -> None:
+    """What is too wide for a table: the first cell of each row whole, the others below it."""
+    from rich.padding import Padding
+
+    for first, *others in rows:
+        out.print(first, soft_wrap=True, highlight=False)
+        out.print(Padding("; ".join(" ".join(cell.split()) for cell in others if cell), (0, 0, 0, 4)))
+
+
 def stacked(names: str) -> str:
     """The names of a class below each other: in one line they leave the columns beside them no room."""
     return names.replace(" or ", " or\n")

@@ -16,13 +16,15 @@ from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, 
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.records import SampleBlock, plain_name
+from commissioner.report.run.standing import Held
 from commissioner.run import restore as restoring
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.archive.summary import summarise
+from commissioner.run.archive.summary import read_summary, summarise
 from commissioner.settings import load_motor
 from tests.support.archive.chained import rechain
 from tests.support.archive.killed import die
+from tests.support.archive.synthetic import make_run
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")
@@ -281,3 +283,42 @@ def test_a_disk_that_fills_up_while_restoring_says_what_the_drive_may_hold(bench
         with pytest.raises(WriteBackFailed, match="old or its new parameters"):
             bench.restore()
     assert summarise(bench.folder.path).written.startswith("old or new")
+
+
+@pytest.mark.parametrize(("had_written", "says"), [(True, Held.NEW), (False, Held.OLD_OR_NEW)])
+def test_a_restore_that_failed_and_left_the_drive_as_it_was_leaves_what_was_known_of_it(bench, had_written, says):
+    """Where a write-back was killed before, nothing was known, and nothing is."""
+    report = bench.write()
+    if had_written:
+        bench.folder.journal("parameters_written", report)
+    since = summarise(bench.folder.path).held_utc
+    bench.drive.commit_result = 4
+    with pytest.raises(WriteBackFailed, match="held before this restore, verified"):
+        bench.restore()
+    told = summarise(bench.folder.path)
+    assert (told.held, told.written.startswith(says.value)) == (says, True)
+    assert (told.held_utc == since) == had_written
+    bench.drive.commit_result = 2
+    assert bench.restore().written and summarise(bench.folder.path).held is Held.RESTORED
+
+
+def test_how_the_drive_stands_is_kept_as_a_record_and_read_from_the_sentence_of_earlier_versions_alone(tmp_path):
+    folder = make_run(tmp_path, "20260101-000000-simulated-abcdef")
+    writing = RunFolder(folder)
+    writing.journal("about_to", {"action": "commit", "values": {}})
+    writing.close()
+    path, size = folder / "summary.json", (folder / "journal.jsonl").stat().st_size
+    kept = json.loads(path.read_text())
+    assert kept["summary"]["held"] == "old or new"
+    kept["summary"]["written"] = "in words that begin otherwise"
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size).held is Held.OLD_OR_NEW
+    del kept["summary"]["held"]
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size).held is Held.NOT_KNOWN
+    kept["summary"]["written"] = "new, read back and stored"
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size).held is Held.NEW
+    kept["summary"]["held"] = "something else"
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size) is None
