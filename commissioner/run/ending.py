@@ -22,11 +22,14 @@ from commissioner.link.drive.facts import DisarmReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.documents import archive_lost
+from commissioner.records import DriveIdentity
 from commissioner.run.archive.folder import RunFolder
 from commissioner.safety.watch import TOO_LATE
 
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
+WRITING_BEGAN = "writing_began"
+"""Kind of the record that stands before everything a write-back or restore of an archived run journals."""
 SLOW_SHARE = 0.25
 """Of the watchdog's time: an answer that takes as long is slower than any that the watchdog was armed for."""
 
@@ -126,6 +129,11 @@ def with_shares(error: CommissionerError, host_s: float, link_s: float) -> Commi
     if error.what == TOO_LATE and host_s + link_s > 0.0:
         error.what += f"; of the last {host_s + link_s:.2g} s this host took {host_s:.2g} s, and the link {link_s:.2g} s to answer"
     return error
+
+
+def began_to_write(journal: RunFolder, what: str, identity: DriveIdentity) -> None:
+    """The record that a write-back or restore begins with: the run is proved, and its drive answers."""
+    journal.journal(WRITING_BEGAN, {"what": what, "drive": identity.words}, durable=True)
 
 
 def write_lost(failure: OSError, folder: RunFolder) -> WriteBackFailed:

@@ -24,7 +24,7 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.archive.summary import CALLED_OFF, RunSummary
-from commissioner.run.ending import note, write_lost
+from commissioner.run.ending import began_to_write, note, write_lost
 from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.proof import prove, prove_verdict
@@ -90,7 +90,8 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
         with closing(port):
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
             with Mastery(inverter, lock) as mastery:
-                mastery.take(inverter.identify())
+                mastery.take(identity := inverter.identify())
+                began_to_write(journal, RESTORING, identity)
                 report = _bring_back(inverter, snapshot, lines, journal, run.held)
         note(journal, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
     return Restored(

@@ -29,7 +29,7 @@ from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.archive.summary import NO_RESULT, RunSummary
 from commissioner.run.archive.verify import Verified, refuse_damage
-from commissioner.run.ending import note, write_lost
+from commissioner.run.ending import began_to_write, note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.index.results import flux_level
@@ -136,7 +136,8 @@ def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | No
         port = open_port(address, ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
         inverter = Inverter(port, ready.profile, lambda intent: journal.journal("about_to", intent, durable=True))
         with closing(port), Mastery(inverter, lock) as mastery:
-            mastery.take(inverter.identify())
+            mastery.take(identity := inverter.identify())
+            began_to_write(journal, "write back", identity)
             wanted = drive_values(ready.profile, circuit, ready.base).values
             check_token(_plan(run, ready, inverter, "write back", wanted), token)
             try:

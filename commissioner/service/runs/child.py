@@ -109,8 +109,11 @@ class Child:
         return _refusal(code, _document(text), self._log)
 
 
-async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> tuple[int, JsonObject]:
-    """A verb with --json as a process: exit code and document. Refusal where it answered none."""
+async def ask(
+    arguments: Sequence[str], log: Path, timeout_s: float = 120.0, *, may_kill: bool = True
+) -> tuple[int, JsonObject]:
+    """A verb with --json as a process: exit code and document. Refusal where it answered none. `may_kill`: not of one that writes into
+    a drive; where nobody waits for it any longer, as where the service is shut down, it goes on to its end by itself."""
     log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("wb") as errors:
         process = await asyncio.create_subprocess_exec(
@@ -120,9 +123,10 @@ async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> 
     try:
         text, _ = await asyncio.wait_for(process.communicate(), timeout_s)
     except BaseException as broken:
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
+        if may_kill:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
         if not isinstance(broken, TimeoutError | asyncio.TimeoutError):
             raise
         raise Refusal(503, f"`commissioner {arguments[0]}` took too long", step=arguments[0], value=f"{timeout_s:g} s",
@@ -143,9 +147,11 @@ async def ask_for(wanted: str, arguments: Sequence[str], log: Path) -> JsonObjec
     return document
 
 
-async def succeed(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> JsonObject:
-    """The verb's document. Refusal in the verb's own words where it failed."""
-    code, document = await ask(arguments, log, timeout_s)
+async def succeed(
+    arguments: Sequence[str], log: Path, timeout_s: float = 120.0, *, may_kill: bool = True
+) -> JsonObject:
+    """The verb's document. Refusal in the verb's own words where it failed. `may_kill`: as `ask`."""
+    code, document = await ask(arguments, log, timeout_s, may_kill=may_kill)
     if code != 0:
         raise _refusal(code, document, log)
     return document

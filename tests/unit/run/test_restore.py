@@ -21,6 +21,7 @@ from commissioner.run import restore as restoring
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.summary import read_summary, summarise
+from commissioner.service.routes.write import STEPS, step_of
 from commissioner.settings import load_motor
 from tests.support.archive.chained import rechain
 from tests.support.archive.killed import die
@@ -322,3 +323,21 @@ def test_how_the_drive_stands_is_kept_as_a_record_and_read_from_the_sentence_of_
     kept["summary"]["held"] = "something else"
     path.write_text(json.dumps(kept))
     assert read_summary(folder, size) is None
+
+
+def test_the_steps_of_a_restore_are_told_by_its_records_as_they_come(bench, monkeypatch):
+    """A page that only span for the ten seconds of a proof told nobody whether the drive was being written."""
+    bench.write()
+    die(bench.folder)
+    journal, told = bench.folder.path / "journal.jsonl", []
+    offset, write = journal.stat().st_size, RunFolder.journal
+    told.append(step_of(journal, offset))
+
+    def told_of(folder, *record, **how):
+        write(folder, *record, **how)
+        told.append(step_of(journal, offset))
+
+    monkeypatch.setattr(RunFolder, "journal", told_of)
+    bench.restore()
+    assert list(dict.fromkeys(told)) == list(STEPS)
+    assert step_of(journal.parent / "gone.jsonl", offset) == STEPS[0]

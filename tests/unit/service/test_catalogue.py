@@ -222,7 +222,7 @@ LONGER = "an answer that needs longer gets it by reply=SECONDS in the address"
 @pytest.mark.parametrize(
     "said",
     [
-        *("no answer to '%s'" % what for what in ("read 6 registers at 97", "read 1 register at 97", "write 3 registers at 34 and read 125 at 256", "write register 7")),
+        *(f"no answer to '{what}'" for what in ("read 6 registers at 97", "read 1 register at 97", "write 3 registers at 34 and read 125 at 256", "write register 7")),
         "no answer to 'read 6 registers at 97'; the link was slow: an answer took 0.21 s",
         "nothing in 0.25 s", "7 of the answer's 9 bytes in 0.25 s", "the connection broke: x", "an answer of device 2", "an answer of device 1 within 0.25 s",
         *(f"{where}; {LONGER}" for where in (modbus.SILENT, modbus.DISTURBED, PORT, f"see that Modbus TCP, and nothing else, answers on this port; {PORT}")),

@@ -70,7 +70,7 @@ setInterval(() => {
 }, 250);
 
 /* ---- the band ---------------------------------------------------------------------------------------------------- */
-const put = (id, text) => {
+export const put = (id, text) => {
   const node = document.getElementById(id);
   if (node.textContent !== text) node.textContent = text;
 };
@@ -235,7 +235,9 @@ document.addEventListener(
 /* ---- small helpers of forms -------------------------------------------------------------------------------------- */
 document.addEventListener("submit", (event) => {
   const busy = event.target.dataset?.busy;
-  if (busy) {
+  if (busy && event.target.dataset.sent) event.preventDefault(); // pressed twice: once is enough
+  else if (busy) {
+    event.target.dataset.sent = "yes";
     const button = event.target.querySelector("button");
     button.textContent = busy;
     put("say", busy);
