@@ -21,8 +21,8 @@ from commissioner.errors import (
 from commissioner.link.drive.facts import DisarmReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
-from commissioner.run.archive.documents import archive_lost
 from commissioner.records import DriveIdentity
+from commissioner.run.archive.documents import archive_lost
 from commissioner.run.archive.folder import RunFolder
 from commissioner.safety.watch import TOO_LATE
 

@@ -75,7 +75,12 @@ async def writing(request: Request, run: str, _who: Viewer) -> WritingDocument:
     if going is None:
         return {"what": "", "steps": [], "step": None, "seconds": None}
     step = await asyncio.to_thread(step_of, entry.folder / "journal.jsonl", going.offset)
-    return {"what": going.what, "steps": list(STEPS), "step": step, "seconds": round(time.monotonic() - going.began_s, 1)}
+    return {
+        "what": going.what,
+        "steps": list(STEPS),
+        "step": step,
+        "seconds": round(time.monotonic() - going.began_s, 1),
+    }
 
 
 def step_of(journal: Path, offset: int) -> str:

@@ -25,7 +25,7 @@ from commissioner.service.simulator import SCENARIOS
 PRODUCT = Path(commissioner.__file__).parent
 PAGE = PRODUCT / "service" / "page"
 SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py", "run/inspection.py",
-        "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
+        "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/page", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py", "service/library.py", "service/recordings.py", "service/simulator.py", "operations/history/runs.py", "run/ending.py", "run/archive/documents.py", "run/write_accepted.py", "run/restore.py", "run/holding", "run/tuning",
         "link/drive", "link/wire/modbus.py", "link/wire/trust.py", "identify/inverter", "identify/batch", "identify/intake", "identify/estimate", "identify/analysis.py", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""

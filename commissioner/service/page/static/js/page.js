@@ -96,6 +96,7 @@ function showBand(band) {
   }
   wasLive = band.level === "live" || band.level === "alarm";
   if (place.run && band.run === place.run) follow(band.phase);
+  else if (place.run && $("#livedata, #tuning")) follow("ended"); // a service that was begun anew knows it as one that was cut off
 }
 export function level(name) {
   if (root.dataset.level === name) return;
@@ -146,9 +147,13 @@ async function follow(phase) {
 /* the work of this page as the service shows it now, where `isWanted` says so of it */
 export async function renew(isWanted = () => true) {
   const answer = await fetch(location.href, { headers: { accept: "text/html" } });
-  if (!answer.ok) return true;
-  const next = new DOMParser().parseFromString(await answer.text(), "text/html");
+  return showPage(await answer.text(), isWanted);
+}
+/* the work of another page in this one's place; band and STOP stay */
+export function showPage(html, isWanted = () => true) {
+  const next = new DOMParser().parseFromString(html, "text/html");
   if (!isWanted(next)) return false;
+  if (!next.querySelector("#main")) return true;
   for (const selector of ["#main", "#steps"]) {
     const fresh = next.querySelector(selector),
       old = $(selector);
