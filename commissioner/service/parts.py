@@ -28,9 +28,11 @@ STOPS, STOPS_WITHIN_S = 60, 1.0
 
 @dataclass(frozen=True)
 class Writing:
-    """A write-back or restore that goes on: what it journals stands behind `offset` bytes of its run's journal."""
+    """A write-back or restore that goes on, into a drive of the library, or none of it: what it journals stands behind `offset` bytes
+    of its run's journal."""
 
     what: str
+    drive: str
     offset: int
     began_s: float
 

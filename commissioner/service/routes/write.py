@@ -102,7 +102,7 @@ def step_of(journal: Path, offset: int) -> str:
 
 
 @contextmanager
-def _told(parts: Parts, run: str, folder: Path, what: Act) -> Iterator[None]:
+def _told(parts: Parts, run: str, folder: Path, what: Act, drive: Drive | None) -> Iterator[None]:
     """While it goes on its steps can be asked for. Refusal 409: one goes on already, as where a button was pressed twice."""
     if (going := parts.writing.get(run)) is not None:
         raise Refusal(
@@ -110,7 +110,8 @@ def _told(parts: Parts, run: str, folder: Path, what: Act) -> Iterator[None]:
             remedy="wait until it has ended, then look at the run",
         )  # fmt: skip
     journal = folder / "journal.jsonl"
-    parts.writing[run] = Writing(what, journal.stat().st_size if journal.is_file() else 0, time.monotonic())
+    size = journal.stat().st_size if journal.is_file() else 0
+    parts.writing[run] = Writing(what, drive.id if drive is not None else "", size, time.monotonic())
     try:
         yield
     finally:
@@ -133,7 +134,7 @@ async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> Wr
         _must_be_free(parts, drive, what)
         parts.desk.control(drive.id).take(who.party)
     arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
-    with _told(parts, entry.run, entry.folder, what):
+    with _told(parts, entry.run, entry.folder, what, drive):
         await parts.note(who, f"asked to {what.replace('-', ' ')}", run=run, table=token)
         done = await _with_drive(parts, drive, arguments, ACT_S, may_kill=False)
     rows = (done.get("report") or done).get("written") or []

@@ -37,6 +37,7 @@ function lost() {
   isLost = true;
   const note = document.querySelector("#writinglost");
   note.hidden = false;
+  panel.hidden = true;
   note.scrollIntoView({ block: "nearest" });
   put("say", note.textContent.trim());
 }
@@ -47,6 +48,7 @@ form.addEventListener("submit", async (event) => {
   event.preventDefault();
   if (goesOn) return;
   goesOn = true;
+  form.parentElement.hidden = true; // its way back would say that nothing is written
   panel.hidden = false;
   panel.scrollIntoView({ block: "nearest" });
   setTimeout(look, EVERY_MS);
