@@ -69,12 +69,13 @@ class Child:
         """To what the run's journal asks the person at the drive."""
         self._say("answer", {"number": number, "done": is_done})
 
-    async def wait(self) -> None:
-        """Until it has ended. What it says then is in its folder as well."""
+    async def wait(self) -> JsonObject:
+        """Until it has ended; what it says then, which is in its folder as well where its disk took that."""
         assert self._process.stdout is not None
-        await self._process.stdout.read()
+        said = await self._process.stdout.read()
         await self._process.wait()
         self._beating.cancel()
+        return _document(said)
 
     @property
     def is_alive(self) -> bool:

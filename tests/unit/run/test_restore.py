@@ -12,7 +12,14 @@ import pytest
 from commissioner.cli.screens import screen
 from commissioner.cli.verbs.archived import deciding
 from commissioner.cli.verbs.archived.deciding import restore_run
-from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError, WriteBackFailed
+from commissioner.errors import (
+    CommissionerError,
+    DataRefused,
+    IdentityMismatch,
+    LinkUnreachable,
+    UsageError,
+    WriteBackFailed,
+)
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.records import SampleBlock, plain_name
@@ -266,6 +273,25 @@ def test_a_block_that_is_written_short_leaves_no_torn_record(bench):
     assert [b.first_index for _, b in read_blocks(bench.folder.path / "blocks.bin")] == [0, 58]
 
 
+@pytest.mark.parametrize("full_at", ["writing_began", "stage"])
+def test_on_a_disk_that_is_full_before_anything_was_sent_nothing_is_said_to_be_in_doubt(bench, monkeypatch, full_at):
+    report = bench.write()
+    bench.folder.journal("parameters_written", report)
+    journal = RunFolder.journal
+
+    def filling(folder, kind, record, *, durable=False):
+        if kind == full_at or (kind == "about_to" and record.action.name.lower() == full_at):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        journal(folder, kind, record, durable=durable)
+
+    monkeypatch.setattr(RunFolder, "journal", filling)
+    before, count = bench.held(), len(bench.drive.log)
+    with pytest.raises(CommissionerError, match="No space left on device; nothing was written into the drive"):
+        bench.restore()
+    assert bench.held() == before and not {"commit", "store"} & {name for name, _ in bench.drive.log[count:]}
+    assert summarise(bench.folder.path).held is Held.NEW
+
+
 @pytest.mark.parametrize("full_at", ["commit", "store", "snapshot_restored"])
 def test_a_disk_that_fills_up_while_restoring_says_what_the_drive_may_hold(bench, monkeypatch, full_at):
     bench.write()
@@ -338,6 +364,8 @@ def test_the_steps_of_a_restore_are_told_by_its_records_as_they_come(bench, monk
         told.append(step_of(journal, offset))
 
     monkeypatch.setattr(RunFolder, "journal", told_of)
-    bench.restore()
+    said = []
+    restoring.restore(summarise(bench.folder.path), None, observe=deciding._telling(said.append))
+    assert [words.split(" ")[0] for words in said] == ["comparing", "staging", "bringing", "storing"]
     assert list(dict.fromkeys(told)) == list(STEPS)
     assert step_of(journal.parent / "gone.jsonl", offset) == STEPS[0]
