@@ -249,7 +249,7 @@ def test_a_write_that_failed_and_was_taken_back_leaves_nobody_in_doubt(
             self.announce = announce
 
         def identify(self):
-            pass
+            return SimpleNamespace(words="a drive")
 
         def write_circuit(self, *_):
             self.announce(Intent(Action.COMMIT, {}))
