@@ -18,7 +18,8 @@ export const number = (value, digits, unit = "") => {
 const root = document.documentElement;
 const place = document.body.dataset;
 const OFFLINE_MS = 1500,
-  RETRY_MS = 500;
+  RETRY_MS = 500,
+  ONCE_MS = 5000;
 let socket = null,
   heardAt = performance.now(),
   wasLive = root.dataset.level === "live" || root.dataset.level === "alarm";
@@ -243,6 +244,7 @@ document.addEventListener("submit", (event) => {
   if (busy && event.target.dataset.sent) event.preventDefault(); // pressed twice: once is enough
   else if (busy) {
     event.target.dataset.sent = "yes";
+    setTimeout(() => delete event.target.dataset.sent, ONCE_MS); // where its answer was given up it may be pressed again
     const button = event.target.querySelector("button");
     button.textContent = busy;
     put("say", busy);
