@@ -158,9 +158,11 @@ class IdentityMismatch(DriveError):
 
 
 class WriteBackFailed(DriveError):
-    """`was_restored`: the snapshot was seen in the drive again; False says it was not, or could not be, verified."""
+    """`was_restored`: the snapshot was seen in the drive again; False says it was not, or could not be, verified. `is_as_found`: of a
+    restore, that the drive was seen to hold what it held before it."""
 
     was_restored: bool = False
+    is_as_found: bool = False
 
 
 class LinkError(DriveError):

@@ -23,7 +23,7 @@ from commissioner.cli.verbs.ports import FoundAdapters
 from commissioner.cli.verbs.serve import KnownAccounts
 from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.export.contract import ModelDocument
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, plain
 from commissioner.identify.contract import AnyIdentification
 from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring
 from commissioner.operations.archive import Exported, ReplayedRun, Reported
@@ -110,7 +110,7 @@ class AsEncoded(GenerateJsonSchema):
 
     def enum_schema(self, schema: Any) -> JsonObject:
         made: JsonObject = super().enum_schema(schema)
-        return made | {"type": "string", "enum": [one.name.lower() for one in schema["members"]]}
+        return made | {"type": "string", "enum": [plain(one) for one in schema["members"]]}
 
     def dataclass_schema(self, schema: Any) -> JsonObject:
         made: JsonObject = super().dataclass_schema(schema)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import CommissionerError, DataRefused
+from commissioner.operations.events import Observe, nobody
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_folder, find_run, must_be_archive, run_folders
@@ -117,14 +118,16 @@ def verify_folder(folder: Path, key: bytes | None) -> Verified:
         )  # fmt: skip
 
 
-def replay_run(runs: Path, run: str, *, salvage: bool = False) -> tuple[ReplayedRun, Verified]:
+def replay_run(
+    runs: Path, run: str, *, salvage: bool = False, observe: Observe = nobody
+) -> tuple[ReplayedRun, Verified]:
     """Decides the run again from its archive. DataRefused: the folder is not as the run left it, unless `salvage`."""
     summary = find_run(runs, run)
     folder = Path(summary.folder)
     verified = verify(folder)
     if not salvage:
         refuse_damage(folder, verified, "replay")
-    done = replay(folder, salvage=not verified.is_whole)
+    done = replay(folder, salvage=not verified.is_whole, observe=observe)
     replayed = ReplayedRun(
         summary.run, done.decisions, done.is_identical, done.difference, verified.state, tuple(verified.losses)
     )

@@ -69,8 +69,8 @@ def restore(
     summary = request.find()
     if token is not None:
         check_token(plan_restore(summary, request.drive), token)
-    observe(Began("proving the run, then writing and reading back"))
-    done = write_snapshot(summary, request.drive, key=key)
+    observe(Began("proving the run"))
+    done = write_snapshot(summary, request.drive, key=key, observe=observe)
     mark_restored(summary, key)
     return done
 
@@ -80,10 +80,10 @@ def planned_write(request: RunRequest) -> Plan:
     return plan_write_back(request.find(), request.drive)
 
 
-def write_run(request: RunRequest, token: str, key: bytes | None = None) -> Written:
+def write_run(request: RunRequest, token: str, key: bytes | None = None, observe: Observe = nobody) -> Written:
     """The accepted result of a run into its drive. Aborted where `token` is of another table. `key`: of a sealed folder."""
     summary = request.find()
-    written = Written(summary.run, write_accepted(summary, request.drive, token, key))
+    written = Written(summary.run, write_accepted(summary, request.drive, token, key, observe))
     mark_written(summary, key)
     return written
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from commissioner.errors import (
@@ -18,15 +20,18 @@ from commissioner.errors import (
     UsageError,
     WriteBackFailed,
 )
-from commissioner.link.drive.facts import DisarmReport
+from commissioner.link.drive.facts import DisarmReport, Intent
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
+from commissioner.records import DriveIdentity
 from commissioner.run.archive.documents import archive_lost
 from commissioner.run.archive.folder import RunFolder
 from commissioner.safety.watch import TOO_LATE
 
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
+WRITING_BEGAN = "writing_began"
+"""Kind of the record that stands before everything a write-back or restore of an archived run journals."""
 SLOW_SHARE = 0.25
 """Of the watchdog's time: an answer that takes as long is slower than any that the watchdog was armed for."""
 
@@ -126,6 +131,43 @@ def with_shares(error: CommissionerError, host_s: float, link_s: float) -> Commi
     if error.what == TOO_LATE and host_s + link_s > 0.0:
         error.what += f"; of the last {host_s + link_s:.2g} s this host took {host_s:.2g} s, and the link {link_s:.2g} s to answer"
     return error
+
+
+@dataclass(frozen=True)
+class WritingBegan:
+    """`what` begins: the run is proved, and its `drive` answers."""
+
+    what: str
+    drive: str
+
+
+class Announced:
+    """The journal of a write-back or restore of an archived run: each intent is on the disk before the drive hears of it, and whoever
+    observes after that."""
+
+    def __init__(self, folder: RunFolder, observe: Callable[[object], None] | None = None) -> None:
+        self.folder, self.has_any = folder, False
+        self._tell = observe or (lambda _record: None)
+
+    def __call__(self, intent: Intent) -> None:
+        self.folder.journal("about_to", intent, durable=True)
+        self.has_any = True
+        self._tell(intent)
+
+    def begin(self, what: str, identity: DriveIdentity) -> None:
+        """The first record."""
+        began = WritingBegan(what, identity.words)
+        try:
+            self.folder.journal(WRITING_BEGAN, began, durable=True)
+        except OSError as failure:
+            raise self.lost(failure) from failure
+        self._tell(began)
+
+    def lost(self, failure: OSError) -> CommissionerError:
+        """The disk took no more: in the middle of it, or before anything was sent."""
+        if self.has_any:
+            return write_lost(failure, self.folder)
+        return archive_lost(self.folder.path, failure, "; nothing was written into the drive")
 
 
 def write_lost(failure: OSError, folder: RunFolder) -> WriteBackFailed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +35,10 @@ def prove(
     return verified
 
 
-def prove_verdict(folder: Path, verified: Verified, step: str = "restore") -> None:
-    """DataRefused: the run's samples do not lead to its verdict. Where another version made the run its decisions may
+def prove_verdict(
+    folder: Path, verified: Verified, step: str = "restore", observe: Callable[[object], None] | None = None
+) -> None:
+    """DataRefused: the run's samples do not lead to its verdict. `observe` is told of each decision. Where another version made the run its decisions may
     differ, and an old folder has no version: neither is judged."""
     journal = read_journal(folder / "journal.jsonl")
     if verified.state == UNVERIFIED or _version(journal) != program_version():
@@ -45,7 +47,7 @@ def prove_verdict(folder: Path, verified: Verified, step: str = "restore") -> No
         line["kind"] for line in journal
     }:  # without a test nothing led to the verdict
         return
-    done = replay(folder, salvage=not verified.is_whole)
+    done = replay(folder, salvage=not verified.is_whole, observe=observe)
     if done.difference is not None:
         place, replayed, archived = done.difference.apart
         raise DataRefused(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError
+from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError, WriteBackFailed
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import archived_profile
@@ -18,12 +18,13 @@ from commissioner.records import ParameterSnapshot, WrittenParameter, plain_name
 from commissioner.registers.codec import held_words
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
+from commissioner.report.run.standing import Held
 from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
-from commissioner.run.archive.summary import RunSummary
-from commissioner.run.ending import note, write_lost
+from commissioner.run.archive.summary import CALLED_OFF, RunSummary
+from commissioner.run.ending import Announced, note
 from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.proof import prove, prove_verdict
@@ -45,8 +46,11 @@ class Restored:
     """What the drive reports after it; empty: nothing."""
 
 
-def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key: bytes | None = None) -> Restored:
-    """The snapshot of `run` into the drive it was taken from, verified and stored.
+def restore(
+    run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key: bytes | None = None,
+    observe: Callable[[object], None] | None = None,
+) -> Restored:  # fmt: skip
+    """The snapshot of `run` into the drive it was taken from, verified and stored; `observe` is told of each step.
 
     DataRefused: the run took no snapshot, its folder is not as the run left it, or no motor of its plate has such values.
     DriveInUse: another run has the drive. IdentityMismatch: another drive or firmware answers, or it
@@ -70,7 +74,7 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
         )  # fmt: skip
     lines = read_journal(folder / "journal.jsonl")
     snapshot = _complete(read_snapshot(folder, lines), profile, folder)
-    prove_verdict(folder, prove(folder, profile, snapshot, key))
+    prove_verdict(folder, prove(folder, profile, snapshot, key), observe=observe)
     with (
         DriveLock.take(address, profile, RESTORING) as lock,
         closing(RunFolder(folder, key)) as journal,
@@ -87,10 +91,11 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
                 )
             raise
         with closing(port):
-            inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
+            inverter = Inverter(port, profile, announced := Announced(journal, observe))
             with Mastery(inverter, lock) as mastery:
-                mastery.take(inverter.identify())
-                report = _bring_back(inverter, snapshot, lines, journal)
+                mastery.take(identity := inverter.identify())
+                announced.begin(RESTORING, identity)
+                report = _bring_back(inverter, snapshot, lines, announced, run.held)
         note(journal, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
     return Restored(
         run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored, report.fault
@@ -98,14 +103,19 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
 
 
 def _bring_back(
-    inverter: Inverter, snapshot: ParameterSnapshot, lines: list[dict[str, Any]], journal: RunFolder
+    inverter: Inverter, snapshot: ParameterSnapshot, lines: list[dict[str, Any]], announced: Announced, before: Held
 ) -> WriteReport:
+    """The snapshot, into the drive. `before`: what was known of it; of a drive that was seen to hold that still, it is known again."""
     present = inverter.snapshot().in_use
     _check_known(present, snapshot, inverter.profile, lines)
     try:
         return inverter.restore(snapshot, present)
+    except WriteBackFailed as failed:
+        if failed.is_as_found:
+            note(announced.folder, CALLED_OFF, failed.as_dict() | {"held": before.value})
+        raise
     except OSError as failure:
-        raise write_lost(failure, journal) from failure
+        raise announced.lost(failure) from failure
 
 
 def _complete(snapshot: ParameterSnapshot, profile: DriveProfile, folder: Path) -> ParameterSnapshot:

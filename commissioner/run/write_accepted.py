@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -29,7 +29,7 @@ from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.archive.summary import NO_RESULT, RunSummary
 from commissioner.run.archive.verify import Verified, refuse_damage
-from commissioner.run.ending import note, write_lost
+from commissioner.run.ending import Announced, note
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.index.results import flux_level
@@ -116,15 +116,21 @@ def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, f
     return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
 
-def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | None = None) -> WriteReport:
-    """The run's result into its drive, verified and stored, where the table of `token` still holds.
+def write_accepted(
+    run: RunSummary,
+    url: str | None,
+    token: str,
+    key: bytes | None = None,
+    observe: Callable[[object], None] | None = None,
+) -> WriteReport:
+    """The run's result into its drive, verified and stored, where the table of `token` still holds; `observe` is told of each step.
 
     Aborted: it does not. DataRefused: the folder is not as its run left it, or its samples lead to another result. IdentityMismatch:
     another drive. The run's journal says so before and after. `key`: of a sealed folder.
     """
     ready, circuit = _ready(run, url, key), _circuit(run)
     refuse_damage(ready.folder, ready.verified, STEP, "blocks.bin")  # what is lost of the samples proves no result
-    prove_verdict(ready.folder, ready.verified, STEP)
+    prove_verdict(ready.folder, ready.verified, STEP, observe)
     _check_bounds(circuit, ready.plate)
     address = parse_url(ready.url)
     with (
@@ -134,9 +140,10 @@ def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | No
     ):
         lock.name_run(ready.folder.name)
         port = open_port(address, ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
-        inverter = Inverter(port, ready.profile, lambda intent: journal.journal("about_to", intent, durable=True))
+        inverter = Inverter(port, ready.profile, announced := Announced(journal, observe))
         with closing(port), Mastery(inverter, lock) as mastery:
-            mastery.take(inverter.identify())
+            mastery.take(identity := inverter.identify())
+            announced.begin("write back", identity)
             wanted = drive_values(ready.profile, circuit, ready.base).values
             check_token(_plan(run, ready, inverter, "write back", wanted), token)
             try:
@@ -146,7 +153,7 @@ def write_accepted(run: RunSummary, url: str | None, token: str, key: bytes | No
                     note(journal, "snapshot_restored", failed.as_dict())
                 raise
             except OSError as failure:
-                raise write_lost(failure, journal) from failure
+                raise announced.lost(failure) from failure
         note(journal, "parameters_written", report)
     return report
 

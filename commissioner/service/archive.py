@@ -47,16 +47,12 @@ class Entry:
     url: str
     held_utc: str
     lacks_result: bool
+    held: Held
 
     @property
     def drive_key(self) -> str:
         """Tells drives apart: the number, where one has none or did not answer the address."""
         return f"#{self.serial_number}" if self.serial_number is not None else self.url
-
-    @property
-    def held(self) -> Held:
-        """Which parameter set the drive holds, as `written` says it."""
-        return Held.of(self.written)
 
     @property
     def is_unknown(self) -> bool:
@@ -228,6 +224,7 @@ def _read_entry(folder: Path) -> Entry:
         summary.url,
         summary.held_utc or summary.started_utc,
         summary.lacks_result,
+        summary.held,
     )
 
 

@@ -26,6 +26,17 @@ STOPS, STOPS_WITHIN_S = 60, 1.0
 """STOP acts however often it is pressed; what comes faster than this from one address is a defect, not a hand."""
 
 
+@dataclass(frozen=True)
+class Writing:
+    """A write-back or restore that goes on, into a drive of the library, or none of it: what it journals stands behind `offset` bytes
+    of its run's journal."""
+
+    what: str
+    drive: str
+    offset: int
+    began_s: float
+
+
 @dataclass
 class Parts:
     """Everything that lives as long as the service."""
@@ -46,6 +57,8 @@ class Parts:
     logging_in: asyncio.Lock = field(default_factory=asyncio.Lock)
     checks: dict[str, CheckedDocument] = field(default_factory=dict)
     """Newest checks by drive and motor, for the page."""
+    writing: dict[str, Writing] = field(default_factory=dict)
+    """Write-backs and restores that go on, by run."""
     closing: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def note(self, who: Visitor, what: str, **facts: Any) -> None:

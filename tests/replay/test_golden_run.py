@@ -71,9 +71,12 @@ def each_samples_are_fitted_once(monkeypatch, fits):
 
 
 def test_a_run_made_on_this_machine_is_decided_again_bit_for_bit(fresh):
-    replayed = replay(fresh)
+    told = []
+    replayed = replay(fresh, observe=told.append)
     assert replayed.difference is None
     assert replayed.decisions > 30
+    numbers = [progress.number for progress in told]
+    assert numbers == sorted(numbers) and 30 < numbers[-1] <= {progress.of for progress in told}.pop()
 
 
 def test_the_golden_run_is_decided_again(golden):
@@ -246,7 +249,7 @@ def test_a_write_that_failed_and_was_taken_back_leaves_nobody_in_doubt(
             self.announce = announce
 
         def identify(self):
-            pass
+            return SimpleNamespace(words="a drive")
 
         def write_circuit(self, *_):
             self.announce(Intent(Action.COMMIT, {}))

@@ -7,7 +7,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any, Literal
@@ -87,14 +87,15 @@ def confirm(question: str, *, otherwise: str) -> None:
 
 
 @contextmanager
-def busy(doing: str) -> Iterator[None]:
-    """A moving bar and the time gone by on stderr, while something takes longer than a person likes to wait."""
+def busy(doing: str) -> Iterator[Callable[[str], None]]:
+    """A moving bar and the time gone by on stderr, while something takes longer than a person likes to wait; what is called with other
+    words shows these from then on."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("    {task.description}"), BarColumn(bar_width=24), TimeElapsedColumn())
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
-        progress.add_task(doing, total=None)
-        yield
+        task = progress.add_task(doing, total=None)
+        yield lambda text: progress.update(task, description=visible(text))
 
 
 def failure(error: CommissionerError) -> None:
@@ -148,6 +149,15 @@ def table(
     for row in rows:
         made.add_row(*row)
     return made
+
+
+def stacked_rows(rows: Iterable[Sequence[str]]) -> None:
+    """What is too wide for a table: the first cell of each row whole, the others below it."""
+    from rich.padding import Padding
+
+    for first, *others in rows:
+        out.print(first, soft_wrap=True, highlight=False)
+        out.print(Padding("; ".join(" ".join(cell.split()) for cell in others if cell), (0, 0, 0, 4)))
 
 
 def stacked(names: str) -> str:

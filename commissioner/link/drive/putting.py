@@ -35,7 +35,12 @@ class Staged:
     ) -> None:
         self._sets, self._items, self._commands = sets, sets.items, sets.profile.commands
         self._journal, self._sleep, self._clock = journal, sleep, clock
-        self._has_asked_to_commit = False
+        self._has_asked_to_commit = self._has_asked_to_store = False
+
+    @property
+    def can_be_called_off(self) -> bool:
+        """Whether what was asked for, and may still be under way, can be made harmless: a commit by other staged values, a store by nothing."""
+        return not self._has_asked_to_store
 
     def put_in_use(self, target: Values, *, store: bool) -> None:
         self._stage(target)
@@ -48,6 +53,7 @@ class Staged:
     def put_in_memory(self, target: Values) -> None:
         values: dict[str, Value] = {"store": self._commands["store"]}
         self._journal(Intent(Action.STORE, values))
+        self._has_asked_to_store = True
         self._items.write(values)
         self._await_result("store_result", STORE_RESULTS, "store")
         self._sets.verify(target, self._sets.stored(), "read back the stored values")
@@ -109,6 +115,11 @@ class Direct:
         self._sleep, self._clock = sleep, clock
         self._sent: set[str] = set()
         self._was_stored = False
+
+    @property
+    def can_be_called_off(self) -> bool:
+        """Nothing was sent yet, as where the drive's lock did not open: what was, a drive may show late."""
+        return not self._sent
 
     def put_in_use(self, target: Values, *, store: bool) -> None:
         differing = self._sets.differing(target, self._sets.in_use())

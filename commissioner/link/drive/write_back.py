@@ -81,13 +81,7 @@ class WriteBack:
             is_stored = self._bring_back(snapshot)
             return self._report(snapshot.in_use, present, is_stored=is_stored)
         except DriveError as error:
-            raise WriteBackFailed(
-                f"the snapshot could not be restored: {error.what}",
-                step="restore",
-                value=error.value,
-                limit=error.limit,
-                remedy=f"run restore again, until then the drive's parameters are not known; {error.remedy}",
-            ) from error
+            raise self._not_restored(error, present) from error
 
     def _check_present(
         self, snapshot: ParameterSnapshot, in_use: Values | None, stored: Values | None
@@ -216,6 +210,32 @@ class WriteBack:
         )
         failed.was_restored = was_restored
         return failed
+
+    def _not_restored(self, error: DriveError, present: ParameterSnapshot) -> WriteBackFailed:
+        """The failure, and whether the drive was seen to hold what it held before this restore."""
+        try:
+            is_as_found = self._is_as_found(present)
+        except CommissionerError:
+            is_as_found = False
+        failed = WriteBackFailed(
+            f"the snapshot could not be restored: {error.what}; the drive holds what it held before this restore, verified"
+            if is_as_found else f"the snapshot could not be restored: {error.what}",
+            step="restore", value=error.value, limit=error.limit, unit=error.unit,
+            remedy=f"run restore again; {error.remedy}"
+            if is_as_found else f"run restore again, until then the drive's parameters are not known; {error.remedy}",
+        )  # fmt: skip
+        failed.is_as_found = is_as_found
+        return failed
+
+    def _is_as_found(self, present: ParameterSnapshot) -> bool:
+        """Both sets, once nothing that was asked for can still come: of values that were sent one by one, or a store, no look is a proof."""
+        if not self._way.can_be_called_off:
+            return False
+        self._way.take_back(present.in_use)
+        now = self.snapshot()
+        return not self._sets.differing(present.in_use, now.in_use) and not (
+            present.stored and self._sets.differing(present.stored, now.stored)
+        )
 
     def _report(self, target: Values, before: ParameterSnapshot, *, is_stored: bool) -> WriteReport:
         after = self._sets.in_use()

@@ -54,10 +54,17 @@ def trend(archive: Archive, motor: str, picture: Path | None = None) -> MotorTre
 
 
 def trend_of_indicators(baseline: Path, picture: Path | None = None) -> MotorTrend:
-    """Of every recording that `monitor --baseline` kept, at the newest one's operating point, in the order they were kept."""
+    """Of every recording that `monitor --baseline` kept, at the newest one's operating point, in the order they were kept; what a clock
+    that was ahead has dated is not the newest, and left out. DataRefused: there is none."""
     _check(picture)
     history = read(baseline)
-    entries = sorted((*history.healthy, *history.judged), key=lambda entry: entry.utc)
+    kept = (*history.healthy, *history.judged)
+    entries = sorted((entry for entry in kept if not is_ahead(entry.utc)), key=lambda entry: entry.utc)
+    if kept and not entries:
+        raise DataRefused(
+            f"every recording in {baseline} is dated in the future", step="trend", value=min(entry.utc for entry in kept),
+            limit="a time that has come", remedy="set this computer's clock",
+        )  # fmt: skip
     if not entries:
         raise DataRefused(
             f"{baseline} holds no recording", step="trend", value=0, limit="at least one",
@@ -65,7 +72,10 @@ def trend_of_indicators(baseline: Path, picture: Path | None = None) -> MotorTre
         )  # fmt: skip
     newest = entries[-1]
     alike = [entry for entry in entries if is_same_point(entry, newest)]
-    left_out = tuple(f"{entry.source}: at another operating point" for entry in entries if entry not in alike)
+    left_out = (
+        *(f"{entry.source}: at another operating point" for entry in entries if entry not in alike),
+        *(f"{entry.source}: {DATED_AHEAD}" for entry in kept if is_ahead(entry.utc)),
+    )
     names = [name for name in newest.indicators if all(name in entry.indicators for entry in alike)]
     series = {
         name: [

@@ -142,7 +142,8 @@ class LongerTestDocument(TypedDict):
 
 
 class RunDocument(TypedDict):
-    """`parameters` is empty, and what comes of an identification missing, where a run did not get so far."""
+    """`parameters` is empty, and what comes of an identification missing, where a run did not get so far. `energised_s`: motor time under
+    voltage; `duration_s` is the same, under the name that an identification of a recording has for it."""
 
     run: str
     outcome: str

@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Held(StrEnum):
-    """Which parameter set a drive holds after a run, as far as the run could know; with it begins the sentence that says so."""
+    """Which parameter set a drive holds after a run, as far as the run could know."""
 
     RESTORED = "as before (restored)"
     AS_BEFORE = "as before"
@@ -19,7 +19,7 @@ class Held(StrEnum):
 
     @classmethod
     def of(cls, sentence: str) -> Held:
-        """The one that the sentence begins with."""
+        """The one that the sentence begins with: all that summaries of earlier versions kept."""
         return next((one for one in cls if sentence.startswith(one)), cls.NOT_KNOWN)
 
 

@@ -39,9 +39,8 @@ def summarise(
         document |= {
             key: value
             for key, value in identification_document(identification).items()
-            if key not in ("outcome", "reason")
+            if key not in ("outcome", "reason", "duration_s")
         }
-        document["duration_s"] = ended.energised_s
         document |= _more(findings, document["remarks"])
     document["flux_guard"] = {
         "peak_fraction": findings.peak_flux_fraction,

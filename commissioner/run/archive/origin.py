@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from commissioner.link.wire.secrets import shown_call
+from commissioner.text import is_sayable
 
 PERSON = "COMMISSIONER_PERSON"
 """Environment: on whose behalf a run is made, where that is not the user of the process (the service's logged-in person)."""
@@ -40,11 +41,11 @@ def this_process() -> Origin:
     user = user_name()
     return Origin(
         version=program_version(),
-        host=platform.node(),
+        host=in_letters(platform.node()),
         machine=machine_part(),
         process=os.getpid(),
         user=user,
-        person=os.environ.get(PERSON, "").strip() or user,
+        person=in_letters(os.environ.get(PERSON, "").strip()) or user,
         command=shown_call([Path(sys.argv[0]).name, *sys.argv[1:]]),
         python=platform.python_version(),
         system=platform.platform(),
@@ -52,12 +53,23 @@ def this_process() -> Origin:
     )
 
 
+def in_letters(name: str) -> str:
+    """A name that the system handed over as bytes of another encoding than its own, by its letters: UTF-8, else those of Western Europe."""
+    if is_sayable(name):
+        return name
+    said = os.fsencode(name)
+    try:
+        return said.decode("utf-8")
+    except UnicodeDecodeError:
+        return said.decode("cp1252", "replace")
+
+
 def user_name() -> str:
     """The account of this process; a number where it has no name."""
     import getpass
 
     try:
-        return getpass.getuser()
+        return in_letters(getpass.getuser())
     except (OSError, KeyError, ImportError):
         return str(getattr(os, "getuid", os.getpid)())
 

@@ -70,6 +70,14 @@ class Replayed:
         return self.difference is None
 
 
+@dataclass(frozen=True)
+class Decided:
+    """Progress: decision `number` of `of` was made again."""
+
+    number: int
+    of: int
+
+
 class _ArchiveEnds(Exception):
     pass
 
@@ -78,8 +86,8 @@ _NO_RUNS = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError)
 """What values that no run has had make of whatever thinks with them."""
 
 
-def replay(folder: Path, *, salvage: bool = False) -> Replayed:
-    """The decisions of the run in `folder`, made again from its archived answers.
+def replay(folder: Path, *, salvage: bool = False, observe: Callable[[Decided], None] | None = None) -> Replayed:
+    """The decisions of the run in `folder`, made again from its archived answers; `observe` is told of each.
 
     A run that a guard, a fault or the operator ended is compared up to there; with `salvage` a damaged one up to the first
     loss. DataRefused: the folder holds no run.
@@ -101,13 +109,21 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
         archived += [_end(line["record"]) for line in journal if line["kind"] == "run_ended"]
     findings = Findings()
     again = _decide_again(job, findings, journal, folder, announcer, with_end=is_by_itself)
-    replayed, is_alike = _up_to_a_difference(archived, again)
+    replayed, is_alike = _up_to_a_difference(
+        archived, again if observe is None else _observed(again, len(archived), observe)
+    )
     if is_alike and is_by_itself and (folder / "result.json").is_file():
         formed = summarise(findings, read_end(folder, journal), folder.name, job.parameter_names, job.parameter_factors)
         archived += _result(read_saved(folder, "result.json"), formed)
         replayed += _result(formed, formed)
     difference = _first_difference(archived, replayed, may_go_on=not is_by_itself or salvage, may_end=salvage)
     return Replayed(len(replayed) if salvage else len(archived), difference)
+
+
+def _observed(again: Iterator[dict[str, Any]], of: int, observe: Callable[[Decided], None]) -> Iterator[dict[str, Any]]:
+    for number, decision in enumerate(again, 1):
+        observe(Decided(min(number, of), of))
+        yield decision
 
 
 def _is_compared(line: Mapping[str, Any]) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import DataRefused
@@ -25,6 +25,8 @@ NO_RESULT, CAN_BE_MADE = (
     ": `commissioner runs report` makes it from the samples",
 )
 """Said of such a run; the latter where it applied a test of ours."""
+CALLED_OFF = "restore_called_off"
+"""Kind of the record of a restore that failed and left the drive as it was, seen in it: `held` is what was known of it before."""
 NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
 
@@ -36,10 +38,11 @@ def motor_names(summary: Mapping[str, Any]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """`written` says which parameter set the drive holds after the run, as far as the run could know, `held_utc` since when, empty where it
-    holds what it held before. `lacks_result`: it judged, and its process ended before that was kept. `motor`: the plate;
-    `parameters`: value and standard error of each; both empty where the run did not get so far. `motor_tag`, `motor_serial`: which
-    motor it is, as a person said; `motor_name`: under which name the plate was given. `energised_s`: None of a run that was cut off."""
+    """`held`: which parameter set the drive holds after the run, as far as the run could know; `written` says it in a sentence, `held_utc`
+    since when, empty where it holds what it held before. `lacks_result`: it judged, and its process ended before that was kept. `motor`:
+    the plate; `parameters`: value and standard error of each; both empty where the run did not get so far. `motor_tag`, `motor_serial`:
+    which motor it is, as a person said; `motor_name`: under which name the plate was given. `energised_s`: None of a run that was cut
+    off."""
 
     run: str
     folder: str
@@ -64,6 +67,7 @@ class RunSummary:
     motor_name: str = ""
     held_utc: str = ""
     lacks_result: bool = False
+    held: Held = Held.AS_BEFORE
 
     @property
     def motor_id(self) -> str:
@@ -74,11 +78,6 @@ class RunSummary:
     def motor_names(self) -> tuple[str, ...]:
         """Each names the run's motor."""
         return motor_names(vars(self))
-
-    @property
-    def held(self) -> Held:
-        """Which parameter set the drive holds, as `written` says it."""
-        return Held.of(self.written)
 
     @property
     def standing(self) -> Standing:
@@ -113,7 +112,7 @@ def summary_of(folder: Path, records: list[Record], goes_on: Callable[[Path], bo
     serial = identity.get("serial_number")
     origin = _mapping(request.get("origin"))
     named: Mapping[str, Any] = next(reversed(_of(records, NAMED)), origin)
-    written, held_utc = _written(records)
+    told = _told(records)
     return RunSummary(
         run=folder.name,
         folder=str(folder),
@@ -121,7 +120,7 @@ def summary_of(folder: Path, records: list[Record], goes_on: Callable[[Path], bo
         reason=_reason(records, end, lacks=lacks),
         drive=_drive(identity),
         energised_s=_seconds(end.get("energised_s")),
-        written=written,
+        written=told.sentence,
         result=result or None,
         serial_number=serial if isinstance(serial, int) and not isinstance(serial, bool) else None,
         started_utc=_text(records[0], "utc") if records else "",
@@ -136,8 +135,9 @@ def summary_of(folder: Path, records: list[Record], goes_on: Callable[[Path], bo
         motor_tag=_text(named, "motor_tag"),
         motor_serial=_text(named, "motor_serial"),
         motor_name=_text(origin, "motor"),
-        held_utc=held_utc,
+        held_utc=told.utc,
         lacks_result=lacks,
+        held=told.held,
     )
 
 
@@ -148,10 +148,15 @@ def read_summary(folder: Path, journal_bytes: int) -> RunSummary | None:
     if not isinstance(kept, dict) or not isinstance(journal, dict) or journal.get("bytes") != journal_bytes:
         return None
     try:
-        summary = RunSummary(folder=str(folder), **kept)
-    except TypeError:
+        summary = RunSummary(folder=str(folder), **kept | {"held": held_of(kept)})
+    except (TypeError, ValueError, LookupError, AttributeError):
         return None
     return replace(summary, run=folder.name) if _is_typed(summary) else None
+
+
+def held_of(summary: Mapping[str, Any]) -> Held:
+    """Of a summary as it was kept: those of earlier versions say it by the beginning of their sentence alone."""
+    return Held(summary["held"]) if "held" in summary else Held.of(summary["written"])
 
 
 def unreadable(folder: Path, error: Exception) -> RunSummary:
@@ -160,8 +165,9 @@ def unreadable(folder: Path, error: Exception) -> RunSummary:
     if isinstance(error, FileNotFoundError):
         what = f"its {Path(error.filename).name} is missing"
     return RunSummary(
-        folder.name, str(folder), Standing.UNREADABLE.value, what, "not known", None, Held.NOT_KNOWN.value
-    )
+        folder.name, str(folder), Standing.UNREADABLE.value, what, "not known", None, Held.NOT_KNOWN.value,
+        held=Held.NOT_KNOWN,
+    )  # fmt: skip
 
 
 def sound_result(folder: Path) -> JsonObject | None:
@@ -261,26 +267,39 @@ _TUNINGS = ("tuning_began", "tuned_once", "tuning_ended", "tunings_judged")
 """Records of a tuning by the drive itself; another may begin after one has been done."""
 
 
-def _written(records: list[Record]) -> tuple[str, str]:
+class _Told(NamedTuple):
+    """What the drive holds, in a sentence, and since when."""
+
+    held: Held
+    sentence: str
+    utc: str = ""
+
+
+def _told(records: list[Record]) -> _Told:
     """Old, new, or unknown, and since when: the last announcement or confirmation in the journal decides."""
-    said, utc = Held.AS_BEFORE.value, ""
+    told = known = _Told(Held.AS_BEFORE, Held.AS_BEFORE.value)
     for line in records:
-        if word := _word(line["kind"], line["record"]):
-            said, utc = word, _text(line, "utc")
-        elif line["kind"] == "run_ended" and Held.of(said) is Held.RESTORED:
-            said, utc = GIVEN_BACK, ""  # by the run itself, as a tuning that only looks does
-    return said, utc
+        kind, record = line["kind"], line["record"]
+        if word := _word(kind, record):
+            told = _Told(*word, _text(line, "utc"))
+            known = told if told.held is not Held.OLD_OR_NEW else known
+        elif kind == CALLED_OFF and isinstance(record, dict) and record.get("held") == known.held:
+            told = known
+        elif kind == "run_ended" and told.held is Held.RESTORED:
+            told = known = _Told(Held.AS_BEFORE, GIVEN_BACK)  # by the run itself, as a tuning that only looks does
+    return told
 
 
-def _word(kind: str, record: Any) -> str:
-    """What the drive holds from this record of the journal on; empty of one that does not say."""
+def _word(kind: str, record: Any) -> tuple[Held, str] | None:
+    """What the drive holds from this record of the journal on; None of one that does not say."""
     if kind == "parameters_written":
-        return Held.NEW + _kept(record) + _wear(record)
+        return Held.NEW, Held.NEW + _kept(record) + _wear(record)
     if kind == "snapshot_restored":
-        return Held.RESTORED + _wear(record)
+        return Held.RESTORED, Held.RESTORED + _wear(record)
     if kind == "about_to" and _touches_parameters(record):
-        return f"{Held.OLD_OR_NEW}{_mixed(record)}: read the drive, or `commissioner restore` this run"
-    return ""
+        unknown = Held.OLD_OR_NEW
+        return unknown, f"{unknown}{_mixed(record)}: read the drive, or `commissioner restore` this run"
+    return None
 
 
 def _mixed(intent: Mapping[str, Any]) -> str:

@@ -15,6 +15,7 @@ from commissioner.procedure.findings import LeftUnfinished
 from commissioner.records import DriveIdentity
 from commissioner.report.run.standing import Held
 from commissioner.run.archive.catalogue import is_ahead
+from commissioner.run.archive.summary import held_of
 from commissioner.run.index.index import find
 from commissioner.run.index.rows import Wanted
 
@@ -55,7 +56,7 @@ def left_unfinished(runs: Path, url: str, identity: DriveIdentity) -> LeftUnfini
 
 
 def _word(run: dict[str, Any]) -> Word:
-    return Word(run["run"], Held.of(run["written"]), run["held_utc"] or run["started_utc"])
+    return Word(run["run"], held_of(run), run["held_utc"] or run["started_utc"])
 
 
 def _is_same(run: dict[str, Any], url: str, identity: DriveIdentity) -> bool:

@@ -5,6 +5,16 @@ from __future__ import annotations
 from typing_extensions import TypedDict
 
 
+class WritingDocument(TypedDict):
+    """How far a write-back or restore of the run has come: of `steps`, in their order, `step` is the one that goes on, begun `seconds` ago
+    with the first; all empty or null while none goes on."""
+
+    what: str
+    steps: list[str]
+    step: str | None
+    seconds: float | None
+
+
 class ReadBackRow(TypedDict):
     """One parameter in the drive's own unit and convention: before, as written, as read back."""
 

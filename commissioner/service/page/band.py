@@ -207,6 +207,15 @@ def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen,
             t.gettext("The run is being started; the test starts by itself. Stay clear"),
             t.gettext("ends the run: Esc or Space"),
         )
+    if drive.id in {going.drive for going in parts.writing.values()}:
+        return _Said(
+            "asking",
+            t.gettext("State of the motor not known"),
+            t.gettext(
+                "The drive is kept for what is being written, which energises nothing; it is asked again after that"
+            ),
+            nothing,
+        )
     is_open = run is not None and run.feed.state.output != "off"
     if seen.status is not None and seen.age_s <= OLD_S and not seen.error:
         return _by_status(run, _standing(parts, run), seen, t)

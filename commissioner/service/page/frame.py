@@ -148,10 +148,14 @@ def go(path: str) -> RedirectResponse:
     return RedirectResponse(local(path), 303)
 
 
-def refused(request: Request, refusal: Refusal, place: Place = NOWHERE, back: str = "/") -> Response:
-    """A refusal as a page: step, value, limit, what to do."""
+def refused(
+    request: Request, refusal: Refusal, place: Place = NOWHERE, back: str = "/", *, restore: bool = False
+) -> Response:
+    """A refusal as a page: step, value, limit, what to do; `restore`: above all the old values of the run it is about."""
     view = View("frame/refused.html", "Not done", None)
-    return render(request, view, place, status=refusal.problem.status, problem=refusal.problem, back=local(back))
+    return render(
+        request, view, place, status=refusal.problem.status, problem=refusal.problem, back=local(back), restore=restore
+    )
 
 
 def remember(response: Response, fields: dict[str, str]) -> None:

@@ -25,7 +25,7 @@ SCRIPT_TEXTS = (
     "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
     "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "%a, done", "%a, now", "again", "last word %s ago",
     "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing",
-    "Reading the drive …", "The file is being sent …", "no value",
+    "Reading the drive …", "begun %s ago", "The file is being sent …", "no value",
 )  # fmt: skip
 """What scripts say; the page hands it to them in its own language."""
 

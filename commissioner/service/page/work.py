@@ -338,6 +338,8 @@ async def run(request: Request, run: str) -> Response:
             return page
         document = live_document(state, live.feed.current_now_a)
         return render(request, LIVE, Place(run=run, drive=live.drive), state=state, live=document, run=live)
+    if live is not None and not live.feed.folder.is_dir():
+        raise _gone(run)
     entry = parts.archive.find(run)
     asked = parts.archive.request(run)
     result: Mapping[str, Any] = parts.archive.result(run)
@@ -358,6 +360,14 @@ async def run(request: Request, run: str) -> Response:
         return _ended_page(request, place, facts)
     except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, UndefinedError) as error:
         raise damaged(entry.folder, "result.json", str(error)) from error
+
+
+def _gone(run: str) -> Refusal:
+    """Of a run of this service whose folder somebody took away while it was at work, or with a disk that was unplugged."""
+    return Refusal(
+        404, f"the folder of {run} is gone", step="archive", value="no folder", limit="the folder that the run wrote into",
+        remedy="bring the disk or the folder back and load this page again; else what it measured is lost: check the drive and start anew",
+    )  # fmt: skip
 
 
 def _ended_page(request: Request, place: Place, facts: Mapping[str, Any]) -> Response:
@@ -414,7 +424,8 @@ async def _written(request: Request, run: str, what: Act) -> Response:
     try:
         await act(parts, run, what, fields.get("token", ""), who)
     except Refusal as refusal:
-        return refused(request, refusal, place, f"/runs/{run}/{what}")
+        is_open = await asyncio.to_thread(lambda: parts.archive.find(run).is_unknown)
+        return refused(request, refusal, place, f"/runs/{run}" if is_open else f"/runs/{run}/{what}", restore=is_open)
     return go(f"/runs/{run}/{what}/done")
 
 

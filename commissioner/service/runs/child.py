@@ -69,12 +69,13 @@ class Child:
         """To what the run's journal asks the person at the drive."""
         self._say("answer", {"number": number, "done": is_done})
 
-    async def wait(self) -> None:
-        """Until it has ended. What it says then is in its folder as well."""
+    async def wait(self) -> JsonObject:
+        """Until it has ended; what it says then, which is in its folder as well where its disk took that."""
         assert self._process.stdout is not None
-        await self._process.stdout.read()
+        said = await self._process.stdout.read()
         await self._process.wait()
         self._beating.cancel()
+        return _document(said)
 
     @property
     def is_alive(self) -> bool:
@@ -109,8 +110,11 @@ class Child:
         return _refusal(code, _document(text), self._log)
 
 
-async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> tuple[int, JsonObject]:
-    """A verb with --json as a process: exit code and document. Refusal where it answered none."""
+async def ask(
+    arguments: Sequence[str], log: Path, timeout_s: float = 120.0, *, may_kill: bool = True
+) -> tuple[int, JsonObject]:
+    """A verb with --json as a process: exit code and document. Refusal where it answered none. `may_kill`: not of one that writes into
+    a drive; where nobody waits for it any longer, as where the service is shut down, it goes on to its end by itself."""
     log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("wb") as errors:
         process = await asyncio.create_subprocess_exec(
@@ -120,9 +124,10 @@ async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> 
     try:
         text, _ = await asyncio.wait_for(process.communicate(), timeout_s)
     except BaseException as broken:
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
+        if may_kill:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
         if not isinstance(broken, TimeoutError | asyncio.TimeoutError):
             raise
         raise Refusal(503, f"`commissioner {arguments[0]}` took too long", step=arguments[0], value=f"{timeout_s:g} s",
@@ -143,9 +148,11 @@ async def ask_for(wanted: str, arguments: Sequence[str], log: Path) -> JsonObjec
     return document
 
 
-async def succeed(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> JsonObject:
-    """The verb's document. Refusal in the verb's own words where it failed."""
-    code, document = await ask(arguments, log, timeout_s)
+async def succeed(
+    arguments: Sequence[str], log: Path, timeout_s: float = 120.0, *, may_kill: bool = True
+) -> JsonObject:
+    """The verb's document. Refusal in the verb's own words where it failed. `may_kill`: as `ask`."""
+    code, document = await ask(arguments, log, timeout_s, may_kill=may_kill)
     if code != 0:
         raise _refusal(code, document, log)
     return document

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from commissioner.encoding import JsonObject
 from commissioner.run.archive.documents import origin_of
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.summary import lacks_result
@@ -175,13 +176,15 @@ class Desk:
             await asyncio.sleep(POLL_S)
         while run.feed.poll():
             pass
+        if waiting is not None and run.feed.state.end is None:
+            run.feed.state.heard(waiting.result().get("error"))
         run.is_over = True
         self._free_drive(run)
         await asyncio.to_thread(self._write_end, run)
         run.feed.close()
         await self._make_result(run)
 
-    def _has_gone(self, run: LiveRun, waiting: asyncio.Task[None] | None) -> bool:
+    def _has_gone(self, run: LiveRun, waiting: asyncio.Task[JsonObject] | None) -> bool:
         if waiting is not None:
             return waiting.done()
         return run.feed.age_s > GONE_S and run.id not in self._holding

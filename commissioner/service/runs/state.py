@@ -84,6 +84,11 @@ class RunState:
         planned = self.planned_test_s
         return (len(self.tests) - k - 1) * planned + max(0.0, planned - self.tests[k].energised_s)
 
+    def heard(self, error: object) -> None:
+        """What the process of a run said as it went, where its journal has no end, as on a disk that is full."""
+        if isinstance(error, dict) and self.end is None:
+            self.error = error
+
     def energised(self, seconds: float) -> None:
         """Motor time under voltage, as the blocks tell it."""
         k = self.current

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -191,6 +192,13 @@ def test_indicators_of_monitor_have_the_same_trend(tmp_path):
     assert [step.run for step in one.steps] == ["8.csv"] and one.unit == "rad/s"
     assert one.steps[0].relative_change == pytest.approx(0.2 / 0.7, rel=0.1)
     assert len(done.left_out) == 1 and (tmp_path / "fan.png").stat().st_size > 5000
+    ahead = replace(elsewhere, source="ahead.csv", utc="2999-01-01T00:00:00+00:00")
+    write(tmp_path / "fan.json", History(tuple(entries[:6]), (elsewhere, ahead, *entries[6:])))
+    later = trend_of_indicators(tmp_path / "fan.json")
+    assert later.found == done.found and "ahead.csv: its time has not come yet" in later.left_out[-1]
+    write(tmp_path / "fan.json", History((ahead,)))
+    with pytest.raises(DataRefused, match="dated in the future"):
+        trend_of_indicators(tmp_path / "fan.json")
 
 
 CAUSES = [

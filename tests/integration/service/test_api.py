@@ -3,9 +3,12 @@
 import json
 import shutil
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
+
+from commissioner.service.routes.write import STEPS
 
 PLATE = {
     "rated_power_w": 2200, "rated_voltage_v": 400, "rated_frequency_hz": 50, "rated_current_a": 5, "rated_speed_rpm": 1436,
@@ -148,10 +151,15 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
     assert "nothing to write" in is_problem(again, 409)["title"]
     old = service.client.get(f"/api/runs/{finished}/restore").json()
     assert [r["will_be"] for r in old["rows"]] == pytest.approx([r["now"] for r in table["rows"]])
-    assert (
-        service.client.post(f"/api/runs/{finished}/restore", json={"token": old["token"]}).json()["outcome"]
-        == "restored"
-    )
+    with ThreadPoolExecutor() as beside:
+        asked = beside.submit(service.client.post, f"/api/runs/{finished}/restore", json={"token": old["token"]})
+        steps = []
+        while not asked.done():
+            steps.append(httpx.get(f"{service.url}/api/runs/{finished}/writing").json()["step"])
+    assert asked.result().json()["outcome"] == "restored"
+    seen = [step for step in dict.fromkeys(steps) if step]
+    assert "prove" in seen and seen == [step for step in STEPS if step in seen]
+    assert service.client.get(f"/api/runs/{finished}/writing").json()["steps"] == []
     assert "Restored and read back" in httpx.get(f"{service.url}/runs/{finished}/restore/done").text
     page = (service.runs / finished / "report.html").read_text("utf-8")
     assert page.index("Restored on ") < page.index("Written on ") < page.index("SIM-INV-7A")

@@ -1,9 +1,11 @@
 """What the service survives, and what it says afterwards: killed processes, a full disk, clocks that jump, others at the drive."""
 
+import asyncio
 import datetime as dt
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -240,3 +242,46 @@ def test_a_clock_that_jumps_makes_no_stop_late_and_no_word_old(client, tmp_path,
     feed.poll()
     assert feed.age_s < 2.0
     assert "data 0." in client.get(f"/runs/{run.id}", headers={"accept": "text/html"}).text or feed.state.is_over
+
+
+def test_a_folder_that_was_taken_away_under_a_run_is_said_to_be_gone(client, tmp_path):
+    """Its page stood there as of a test in progress."""
+    chronicle = Chronicle(tmp_path / "runs" / "20260101-000000-simulated", 0.0)
+    chronicle.write("about_to", action="energise")
+    feed = Feed(chronicle.folder)
+    feed.poll()
+    run = LiveRun(chronicle.folder.name, "simulator", "motor_2kw2", feed, None, is_over=True)
+    client.app.state.parts.desk.runs[run.id] = run
+    shutil.rmtree(chronicle.folder)
+    answer = client.get(f"/runs/{run.id}", headers={"accept": "text/html"})
+    assert answer.status_code == 404 and "in progress" not in answer.text
+    assert f"The folder of {run.id} is gone" in answer.text and "check the drive and start anew" in answer.text
+
+
+def test_a_run_that_could_not_write_its_end_is_told_with_what_its_process_said(client, tmp_path):
+    """On a full disk it was told as one whose process is gone, and whose drive went silent."""
+    chronicle = Chronicle(tmp_path / "runs" / "20260101-000000-simulated", 0.0)
+    chronicle.write("about_to", action="energise")
+    chronicle.write("disarmed", verified={"is_confirmed": True, "state": "switch-on disabled"})
+    error = {
+        "what": "no room left",
+        "step": "archive",
+        "value": "x",
+        "limit": "a disk with room",
+        "remedy": "make room",
+    }
+
+    async def wait():
+        return {"outcome": "faulted", "error": error}
+
+    run = LiveRun(
+        chronicle.folder.name, "simulator", "motor_2kw2", Feed(chronicle.folder), None, SimpleNamespace(wait=wait)
+    )
+    desk = client.app.state.parts.desk
+    desk.runs[run.id] = run
+    with ThreadPoolExecutor(1) as apart:
+        apart.submit(asyncio.run, desk._follow(run)).result()
+    page = client.get(f"/runs/{run.id}", headers={"accept": "text/html"}).text
+    assert (
+        "The run was cut off" in page and "No room left" in page and "Make room" in page and "went silent" not in page
+    )

@@ -28,6 +28,20 @@ SIZES = {"1280": (1280, 800), "1024": (1024, 768), "390": (390, 844)}
 SLOW_MS = 240_000
 """A simulated drive beside other work on the host."""
 LOOKS = 20
+PAPER = {"upright": 703, "lying": 1032}
+"""Pixels of A4 between margins of 12 mm."""
+JUDGE_PAPER = """() => {
+  const faults = [], box = (selector) => document.querySelector(selector).getBoundingClientRect();
+  const [red, green, blue] = getComputedStyle(document.body).color.match(/[0-9.]+/g).map(Number);
+  if (red + green + blue > 300) faults.push('light letters on white paper');
+  if (box('main').width < 0.8 * innerWidth) faults.push(`the work is ${Math.round(box('main').width)} px wide`);
+  if (box('#small').bottom > box('#band').bottom + 1 || box('#band').bottom > box('main').top + 1) faults.push('the band runs into the work');
+  for (const node of document.querySelectorAll('main *:not(svg *):not(iframe):not(.hidden)')) {
+    const b = node.getBoundingClientRect();
+    if (b.width > 1 && b.height > 1 && b.right > innerWidth + 1) { faults.push(`${node.tagName} ${node.className} is cut off: ${node.textContent.trim().slice(0, 40)}`); break; }
+  }
+  return faults;
+}"""
 KEEP_WHAT_IS_SAID = """() => {
   const look = () => {
     const said = JSON.parse(sessionStorage.getItem('said') || '[]'), before = said.length;
@@ -189,6 +203,17 @@ class Technician:
     def overflow(self) -> int:
         """Pixels by which the page is wider than its window."""
         return int(self.page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth"))
+
+    def faults_on_paper(self) -> list[str]:
+        """What a print of this view, upright and lying, would show wrong; also of a page that is dark on the screen."""
+        found = []
+        for width in PAPER.values():
+            self.page.set_viewport_size({"width": width, "height": 1000})
+            self.page.emulate_media(media="print", color_scheme="dark")
+            found += [f"on {width} px of paper: {fault}" for fault in self.page.evaluate(JUDGE_PAPER)]
+        self.page.emulate_media(media="screen", color_scheme="light")
+        self.size("1280")
+        return found
 
     def stop_is_in_view(self) -> bool:
         """STOP, whole, inside the window and not covered."""

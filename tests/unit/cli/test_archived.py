@@ -37,6 +37,25 @@ def test_no_word_of_a_list_of_runs_is_broken_at_80_columns(monkeypatch, standing
     assert set(wanted) <= set(shown.get().split())
 
 
+@pytest.mark.parametrize("width", [50, 80, 120])
+@pytest.mark.parametrize(
+    "run", ["20261129-043338-schneider_atv_process-3d243a-12", "20261129-043338-danfoss_fc302-3d243a"]
+)
+def test_a_long_id_stays_whole_and_so_do_the_words_beside_it(monkeypatch, run, width):
+    facts = {
+        "plate": "2.2 kW, 400 V, 5 A, 1436 1/min",
+        "drive": "FC-302 #20250117",
+        "person": "anna-katharina",
+        "holds": "new",
+    }
+    row = SimpleNamespace(run=run, standing="commissioned, old or new", motor="", **facts)
+    monkeypatch.setattr(runs, "find_runs", lambda *_: SimpleNamespace(rows=[row], total=1))
+    monkeypatch.setattr(screen.out, "width", width)
+    with screen.out.capture() as shown:
+        runs.list_runs(None, as_json=False, wanted=None)
+    assert {run, *" ".join(facts.values()).split()} <= set(shown.get().replace(";", " ").split())
+
+
 def test_what_holds_for_every_run_is_said_once(monkeypatch):
     one = SimpleNamespace(
         run="a", state="intact", usable="all", losses=(), seal="none", remarks=("no seal",), is_whole=True

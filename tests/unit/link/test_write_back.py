@@ -305,6 +305,32 @@ def test_a_restore_that_cannot_be_verified_says_so(bench):
     assert not caught.value.was_restored
 
 
+@pytest.mark.parametrize(
+    ("item", "result", "is_known"), [("commit_result", 4, True), ("commit_result", 1, True), ("store_result", 3, False)]
+)
+def test_a_restore_that_the_drive_refused_says_whether_what_it_held_was_seen_again(bench, item, result, is_known):
+    """A store that may still be under way is proved by no look."""
+    bench.inverter.write_parameters(NEW, bench.snapshot)
+    setattr(bench.drive, item, result)
+    with pytest.raises(WriteBackFailed, match="could not be restored") as caught:
+        bench.inverter.restore(bench.snapshot)
+    assert caught.value.is_as_found == is_known == ("are not known" not in caught.value.remedy)
+    assert not is_known or bench.held() == bench.held("stored_") == pytest.approx(NEW, rel=1e-6)
+
+
+def test_after_a_link_that_died_while_restoring_nothing_is_known(bench):
+    bench.inverter.write_parameters(NEW, bench.snapshot)
+
+    def dead(name, words):
+        if name == "commit":
+            bench.drive.failures.extend([ReplyTimeout("no answer", step="read", remedy="")] * 300)
+
+    bench.drive.on_write = dead
+    with pytest.raises(WriteBackFailed) as caught:
+        bench.inverter.restore(bench.snapshot)
+    assert not caught.value.is_as_found
+
+
 # --- commercial drives --------------------------------------------------------------------------------------
 class Registers:
     """A commercial drive: nothing but registers; parameters survive only while `is_storing`."""

@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import re
 import sqlite3
 import stat
@@ -31,6 +32,7 @@ from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder, write_recording
 from commissioner.run.archive.follow import JournalFollower
 from commissioner.run.archive.journal import read_journal
+from commissioner.run.archive.origin import PERSON
 from commissioner.run.archive.seal import read_key
 from commissioner.run.archive.summary import NO_RESULT, summarise
 from commissioner.run.archive.verify import verify
@@ -195,6 +197,18 @@ def test_what_is_added_after_a_torn_line_can_be_read(folder):
     again.close()
     kinds = ["run_started", "a", "folder_closed", "b", "folder_closed"]
     assert [(r["n"], r["kind"]) for r in read_journal(path)] == list(enumerate(kinds))
+
+
+@pytest.mark.parametrize("said", ["M\udcfcller", "M\udcc3\udcbcller", "M\xfcller"])
+def test_who_ran_it_is_told_by_the_letters_that_the_system_has_as_bytes(tmp_path, monkeypatch, said):
+    """A name of a computer that is not set to UTF-8 lost its letters, and nobody found the run by it."""
+    monkeypatch.setenv(PERSON, said)
+    monkeypatch.setattr(platform, "node", lambda: said)
+    with closing(RunFolder.create(tmp_path, "x")) as made:
+        pass
+    told = summarise(made.path)
+    assert (told.person, told.host) == ("M\xfcller", "M\xfcller")
+    assert find_runs(RunFolders(tmp_path), Wanted(person="m\xfcller")).total == 1
 
 
 def intent(action):

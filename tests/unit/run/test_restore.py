@@ -12,17 +12,27 @@ import pytest
 from commissioner.cli.screens import screen
 from commissioner.cli.verbs.archived import deciding
 from commissioner.cli.verbs.archived.deciding import restore_run
-from commissioner.errors import DataRefused, IdentityMismatch, LinkUnreachable, UsageError, WriteBackFailed
+from commissioner.errors import (
+    CommissionerError,
+    DataRefused,
+    IdentityMismatch,
+    LinkUnreachable,
+    UsageError,
+    WriteBackFailed,
+)
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.records import SampleBlock, plain_name
+from commissioner.report.run.standing import Held
 from commissioner.run import restore as restoring
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.archive.summary import summarise
+from commissioner.run.archive.summary import read_summary, summarise
+from commissioner.service.routes.write import STEPS, step_of
 from commissioner.settings import load_motor
 from tests.support.archive.chained import rechain
 from tests.support.archive.killed import die
+from tests.support.archive.synthetic import make_run
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")
@@ -263,6 +273,25 @@ def test_a_block_that_is_written_short_leaves_no_torn_record(bench):
     assert [b.first_index for _, b in read_blocks(bench.folder.path / "blocks.bin")] == [0, 58]
 
 
+@pytest.mark.parametrize("full_at", ["writing_began", "stage"])
+def test_on_a_disk_that_is_full_before_anything_was_sent_nothing_is_said_to_be_in_doubt(bench, monkeypatch, full_at):
+    report = bench.write()
+    bench.folder.journal("parameters_written", report)
+    journal = RunFolder.journal
+
+    def filling(folder, kind, record, *, durable=False):
+        if kind == full_at or (kind == "about_to" and record.action.name.lower() == full_at):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        journal(folder, kind, record, durable=durable)
+
+    monkeypatch.setattr(RunFolder, "journal", filling)
+    before, count = bench.held(), len(bench.drive.log)
+    with pytest.raises(CommissionerError, match="No space left on device; nothing was written into the drive"):
+        bench.restore()
+    assert bench.held() == before and not {"commit", "store"} & {name for name, _ in bench.drive.log[count:]}
+    assert summarise(bench.folder.path).held is Held.NEW
+
+
 @pytest.mark.parametrize("full_at", ["commit", "store", "snapshot_restored"])
 def test_a_disk_that_fills_up_while_restoring_says_what_the_drive_may_hold(bench, monkeypatch, full_at):
     bench.write()
@@ -281,3 +310,62 @@ def test_a_disk_that_fills_up_while_restoring_says_what_the_drive_may_hold(bench
         with pytest.raises(WriteBackFailed, match="old or its new parameters"):
             bench.restore()
     assert summarise(bench.folder.path).written.startswith("old or new")
+
+
+@pytest.mark.parametrize(("had_written", "says"), [(True, Held.NEW), (False, Held.OLD_OR_NEW)])
+def test_a_restore_that_failed_and_left_the_drive_as_it_was_leaves_what_was_known_of_it(bench, had_written, says):
+    """Where a write-back was killed before, nothing was known, and nothing is."""
+    report = bench.write()
+    if had_written:
+        bench.folder.journal("parameters_written", report)
+    since = summarise(bench.folder.path).held_utc
+    bench.drive.commit_result = 4
+    with pytest.raises(WriteBackFailed, match="held before this restore, verified"):
+        bench.restore()
+    told = summarise(bench.folder.path)
+    assert (told.held, told.written.startswith(says.value)) == (says, True)
+    assert (told.held_utc == since) == had_written
+    bench.drive.commit_result = 2
+    assert bench.restore().written and summarise(bench.folder.path).held is Held.RESTORED
+
+
+def test_how_the_drive_stands_is_kept_as_a_record_and_read_from_the_sentence_of_earlier_versions_alone(tmp_path):
+    folder = make_run(tmp_path, "20260101-000000-simulated-abcdef")
+    writing = RunFolder(folder)
+    writing.journal("about_to", {"action": "commit", "values": {}})
+    writing.close()
+    path, size = folder / "summary.json", (folder / "journal.jsonl").stat().st_size
+    kept = json.loads(path.read_text())
+    assert kept["summary"]["held"] == "old or new"
+    kept["summary"]["written"] = "in words that begin otherwise"
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size).held is Held.OLD_OR_NEW
+    del kept["summary"]["held"]
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size).held is Held.NOT_KNOWN
+    kept["summary"]["written"] = "new, read back and stored"
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size).held is Held.NEW
+    kept["summary"]["held"] = "something else"
+    path.write_text(json.dumps(kept))
+    assert read_summary(folder, size) is None
+
+
+def test_the_steps_of_a_restore_are_told_by_its_records_as_they_come(bench, monkeypatch):
+    """A page that only span for the ten seconds of a proof told nobody whether the drive was being written."""
+    bench.write()
+    die(bench.folder)
+    journal, told = bench.folder.path / "journal.jsonl", []
+    offset, write = journal.stat().st_size, RunFolder.journal
+    told.append(step_of(journal, offset))
+
+    def told_of(folder, *record, **how):
+        write(folder, *record, **how)
+        told.append(step_of(journal, offset))
+
+    monkeypatch.setattr(RunFolder, "journal", told_of)
+    said = []
+    restoring.restore(summarise(bench.folder.path), None, observe=deciding._telling(said.append))
+    assert [words.split(" ")[0] for words in said] == ["comparing", "staging", "bringing", "storing"]
+    assert list(dict.fromkeys(told)) == list(STEPS)
+    assert step_of(journal.parent / "gone.jsonl", offset) == STEPS[0]

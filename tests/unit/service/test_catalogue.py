@@ -13,6 +13,7 @@ from jinja2.ext import extract_from_ast
 import commissioner
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.link.files.drive_file import known_drives, load_profile
+from commissioner.link.wire import modbus
 from commissioner.link.wire.modbus import READ_REMEDIES, REMEDIES
 from commissioner.procedure.checks import keeps_up
 from commissioner.procedure.link_plan import StreamPace
@@ -24,9 +25,9 @@ from commissioner.service.simulator import SCENARIOS
 PRODUCT = Path(commissioner.__file__).parent
 PAGE = PRODUCT / "service" / "page"
 SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py", "run/inspection.py",
-        "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
+        "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/page", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py", "service/library.py", "service/recordings.py", "service/simulator.py", "operations/history/runs.py", "run/ending.py", "run/archive/documents.py", "run/write_accepted.py", "run/restore.py", "run/holding", "run/tuning",
-        "link/drive", "identify/inverter", "identify/batch", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
+        "link/drive", "link/wire/modbus.py", "link/wire/trust.py", "identify/inverter", "identify/batch", "identify/intake", "identify/estimate", "identify/analysis.py", "procedure/tuned.py", "recordings", "operations/recordings")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
 FACTS = ("what", "title", "remedy")
 NOT_SHOWN = re.compile(
@@ -93,6 +94,8 @@ def shown(node):
         return ["".join(part.value if isinstance(part, ast.Constant) else "7" for part in node.values)]
     if isinstance(node, ast.IfExp):
         return shown(node.body) + shown(node.orelse)
+    if isinstance(node, ast.BinOp):
+        return [first + second for first in shown(node.left) for second in shown(node.right)]
     return []
 
 
@@ -108,7 +111,7 @@ def core_sentences():
             if not isinstance(node, ast.Call):
                 continue
             function = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
-            if function in ("CheckResult", "Objection", "StopReason", "_outside", "_below"):
+            if function in ("CheckResult", "Objection", "StopReason", "_outside", "_below", "refused", "not_ready"):
                 found = [text for argument in (*node.args[:1], *node.args[-1:]) for text in shown(argument)]
             elif {keyword.arg for keyword in node.keywords} & {"remedy"} and function not in ("_refused", "replace"):
                 first = node.args[1:2] if function == "Refusal" else node.args[:1]
@@ -125,6 +128,39 @@ def of_tables():
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "_refuse":
             yield from (f"7: {text}" for text in shown(node.args[1]))
             yield from shown(node.args[-1])
+
+
+def of_remarks():
+    """What is said beside the values of a recording's identification."""
+    for place in ("identify/intake", "identify/estimate", "identify/analysis.py"):
+        for path in sorted((PRODUCT / place).rglob("*.py")) or [PRODUCT / place]:
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                if isinstance(node, ast.FunctionDef) and node.name in (
+                    "_remarks",
+                    "sentence",
+                    "remark",
+                    "besides_the_axis",
+                ):
+                    yield from sentences_of(node.body[1:] if isinstance(node.body[0], ast.Expr) else node.body)
+                elif isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "remarks":
+                    yield from sentences_of([node.value])
+
+
+def sentences_of(nodes):
+    """The outermost literals; of an axis' sentence within another the inner one stands by itself."""
+    for node in nodes:
+        if found := shown(node):
+            yield from (text for text in found if len(re.findall(r"[a-z]{3,}", text)) > 2)
+        else:
+            yield from sentences_of(ast.iter_child_nodes(node))
+
+
+def of_audits():
+    """What the audit of a recording saw, and its limits."""
+    for path in sorted((PRODUCT / "identify/intake").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "refused":
+                yield from (text for argument in node.args[1:3] for text in shown(argument))
 
 
 def of_tunings():
@@ -164,6 +200,43 @@ def test_what_a_recordings_table_is_refused_for_has_its_translation():
     german, told = Texts("de"), set(of_tables())
     assert len(told) > 30
     assert sorted(text for text in told if not german.knows(text)) == []
+
+
+def test_what_is_said_of_a_recording_that_is_identified_has_its_translation():
+    german, remarks = Texts("de"), set(of_remarks())
+    assert len(remarks) > 12
+    assert sorted(text for text in remarks if not german.knows(text)) == []
+    told = {text: german.short(text) for text in of_audits()}
+    kept = {
+        text: set(re.findall(r"[a-z]{3,}", text)) & set(re.findall(r"[a-z]{3,}", said)) for text, said in told.items()
+    }
+    names = {"voltage", "axis", "deg", "sample", "period", "kind", "standstill", "modulo"}
+    assert len(told) > 20
+    assert {text: words - names for text, words in kept.items() if words - names} == {}
+
+
+PORT = "check the drive's supply, the cable, and that device=1 is its number there"
+LONGER = "an answer that needs longer gets it by reply=SECONDS in the address"
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        *(f"no answer to '{what}'" for what in ("read 6 registers at 97", "read 1 register at 97", "write 3 registers at 34 and read 125 at 256", "write register 7")),
+        "no answer to 'read 6 registers at 97'; the link was slow: an answer took 0.21 s",
+        "nothing in 0.25 s", "7 of the answer's 9 bytes in 0.25 s", "the connection broke: x", "an answer of device 2", "an answer of device 1 within 0.25 s",
+        *(f"{where}; {LONGER}" for where in (modbus.SILENT, modbus.DISTURBED, PORT, f"see that Modbus TCP, and nothing else, answers on this port; {PORT}")),
+        "check that the drive is set to 9600 Bd, parity E, 1 stop and to device 2; then its supply and the cable; " + LONGER,
+        f"take the motor as live: isolate the drive's supply, then look at its status; {modbus.SILENT}; {LONGER}",
+        f"use a link that answers sooner and evenly: a cable in place of radio, VPN or gateway; {modbus.SILENT}; {LONGER}",
+        f"run restore again, until then the drive's parameters are not known; {modbus.SILENT}; {LONGER}",
+        *modbus.EXCEPTION_MEANINGS.values(),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_drive_that_has_gone_is_told_in_german(said):
+    """Nobody needs these words more: a drive that fell silent was told in English on a German page."""
+    left = set(re.findall(r"[a-z]{3,}", Texts("de").tell(said))) & set(re.findall(r"[a-z]{3,}", said))
+    assert left <= {"device", "reply", "parity", "stop", "odbus"}
 
 
 def test_what_to_do_about_each_refused_request_has_its_translation():

@@ -2,6 +2,7 @@
 somebody who is there."""
 
 import asyncio
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -80,6 +81,33 @@ def test_who_does_not_operate_a_drive_writes_nothing_into_it(tmp_path, what):
     assert (refused.value.problem.status, refused.value.problem.title) == (409, "otto operates this drive")
 
 
+def test_a_button_pressed_twice_writes_once_and_how_far_it_is_can_be_asked(tmp_path, monkeypatch):
+    parts = make_parts(Settings(tmp_path / "runs", tmp_path / "data"))
+    make_run(tmp_path / "runs", run := "20240105-081500-simulated-000abc")
+    otto = SimpleNamespace(party=Party("", "otto"), person="otto", address="")
+    begun, told = [], []
+
+    async def slow(*_, may_kill):
+        assert not may_kill
+        begun.append(dict(parts.writing))
+        await asyncio.sleep(0.02)
+        return {"report": {"written": []}}
+
+    async def twice():
+        first = asyncio.create_task(act(parts, run, "write-back", "token", otto))
+        while not begun:
+            await asyncio.sleep(0.001)
+        with pytest.raises(Refusal) as refused:
+            await act(parts, run, "restore", "token", otto)
+        told.append(refused.value.problem)
+        await first
+
+    monkeypatch.setattr("commissioner.service.routes.write.succeed", slow)
+    asyncio.run(twice())
+    assert [list(going) for going in begun] == [[run]] and parts.writing == {}
+    assert (told[0].status, told[0].title) == (409, "the drive of this run is being written already")
+
+
 def test_a_stop_reaches_a_run_whose_process_is_not_there_yet(parts):
     assert begin(parts, ("anna",), stop=("bert", "wait")) == ["stopped by [('bert', 'wait')]"]
 
@@ -88,6 +116,27 @@ def test_a_stop_reaches_a_run_whose_process_is_not_there_yet(parts):
 def test_a_drive_in_use_or_a_full_disk_is_no_broken_drive(tmp_path, kind, status):
     refusal = child._refusal(5, {"error": {"kind": kind, "what": "no run"}}, tmp_path / "log")
     assert refusal.problem.status == status
+
+
+@pytest.mark.parametrize("may_kill", [True, False])
+def test_what_writes_into_a_drive_goes_on_where_the_service_is_shut_down(tmp_path, monkeypatch, may_kill):
+    """Shut down while it wrote, the service killed it after 8 s, whatever half of the values the drive had by then."""
+    done = tmp_path / "done"
+    script = f"import time, pathlib; time.sleep(0.15); pathlib.Path({str(done)!r}).touch()"
+    monkeypatch.setattr(child, "program", lambda *_: [sys.executable, "-c", script])
+
+    async def shut_down():
+        asking = asyncio.create_task(child.succeed(["write-back"], tmp_path / "log", may_kill=may_kill))
+        await asyncio.sleep(0.1)
+        asking.cancel()
+        await asyncio.gather(asking, return_exceptions=True)
+        for _ in range(100 if not may_kill else 3):
+            if done.exists():
+                break
+            await asyncio.sleep(0.1)
+
+    asyncio.run(shut_down())
+    assert done.exists() is not may_kill
 
 
 ANNA, BERT, SCRIPT = Party("a", "anna"), Party("b", "bert"), Party("", "script")

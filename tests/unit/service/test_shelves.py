@@ -12,6 +12,7 @@ from commissioner.identify.estimate.axes import Identity
 from commissioner.operations.history.compare import compare_runs
 from commissioner.operations.history.runs import Archive as Runs
 from commissioner.operations.history.trend import trend
+from commissioner.report.run.standing import Held
 from commissioner.report.sheet.words import NBSP
 from commissioner.service.archive import Archive
 from commissioner.service.page.frame import environment, words_of
@@ -124,16 +125,16 @@ def test_an_unknown_motor_is_refused_in_german():
 @pytest.mark.parametrize(
     ("holds", "may"),
     [
-        ("as before", False),
-        ("as before (restored)", False),
-        ("new, read back and stored", True),
-        ("old or new: read", True),
+        (Held.AS_BEFORE, False),
+        (Held.RESTORED, False),
+        (Held.NEW, True),
+        (Held.OLD_OR_NEW, True),
     ],
 )
 def test_old_values_are_offered_only_where_the_drive_may_hold_others(tmp_path, holds, may):
     make_run(tmp_path, COLD, result=result_of(COLD, MACHINE))
     (tmp_path / COLD / "snapshot.json").write_text("{}")
-    assert replace(Archive(tmp_path).find(COLD), written=holds).can_restore is may
+    assert replace(Archive(tmp_path).find(COLD), held=holds).can_restore is may
 
 
 @pytest.mark.parametrize(("language", "value", "half"), [("en", "4.02 Ω", "± 0.95 Ω"), ("de", "4,02 Ω", "± 0,95 Ω")])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,32 @@ def test_a_run_whose_write_back_was_killed_is_not_told_as_written(tmp_path: Path
         and f"/runs/{run}/restore" in said
     )
     assert "commissioned, old or new" in client.get("/runs").text
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_a_write_back_that_broke_off_half_way_leads_to_the_old_values(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_open: bool
+) -> None:
+    """Its page said to restore first, and led back to the table of the same write-back alone."""
+    run = "20240105-081500-simulated-000abc"
+    writing = RunFolder(make_run(tmp_path / "runs", run, result=result_of(run, MACHINE)))
+    if is_open:
+        writing.journal("about_to", {"action": "commit", "values": {}}, durable=True)
+    die(writing)
+
+    async def broke(*_: object, **__: object) -> None:
+        raise Refusal(502, "no answer", step="write", value="nothing", limit="an answer", remedy="see the cable")
+
+    monkeypatch.setattr("commissioner.service.routes.write.succeed", broke)
+    app = create_app(make_parts(Settings(tmp_path / "runs", tmp_path / "data")))
+    client = TestClient(app, base_url="http://127.0.0.1", headers={"accept": "text/html"})
+    csrf = re.findall(r'name="csrf" value="([^"]+)"', client.get("/").text)[0]
+    answer = client.post(
+        f"/runs/{run}/write-back", data={"csrf": csrf, "token": "x"}, headers={"origin": "http://127.0.0.1"}
+    )
+    assert answer.status_code == 502 and "No answer" in answer.text
+    assert (f'href="/runs/{run}/restore"' in answer.text) is is_open
+    assert (f'href="/runs/{run}/write-back"' in answer.text) is not is_open
 
 
 def said_at_the_start(root: Path) -> str:

@@ -221,7 +221,7 @@ def test_why_the_service_stopped_a_run_is_told_in_german_and_a_persons_words_sta
 @pytest.mark.parametrize("facts", [{}, {"is_stored": False}, {"store_count_after": 3, "endurance_writes": 100000}, {"is_stored": False, "store_count_after": 3, "endurance_writes": 9}, {"values": {"stator_resistance": 3.2}}])  # fmt: skip
 def test_what_a_drive_holds_after_a_run_is_told_in_german(kind, facts):
     """Above all of a run that was cut off while it wrote."""
-    said = summary._word(kind, facts | {"action": "commit"})
+    _held, said = summary._word(kind, facts | {"action": "commit"})
     german = Texts("de").tell(said)
     assert not set(re.findall(r"[a-z]{3,}", german)) & {
         "new",

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
+from commissioner.link.drive.facts import Action, Intent
 from commissioner.operations import archive, closing, write
+from commissioner.operations.events import Observe
 from commissioner.records import WrittenParameter, drive_words, plain_name
+from commissioner.run.archive.replay import Decided
 from commissioner.run.archive.seal import read_key
+from commissioner.run.ending import WritingBegan
 from commissioner.run.holding.priority import lower_priority
 from commissioner.run.write_accepted import Plan, as_document
 from commissioner.text import counted
@@ -35,8 +39,8 @@ def restore_run(
     if not yes:
         _show_plan(write.planned_restore(request), as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
-    with screen.busy("proving the run, then writing and reading back"):
-        done = write.restore(request, token, key=read_key(seal) if seal is not None else None)
+    with screen.busy("proving the run") as say:
+        done = write.restore(request, token, _telling(say), read_key(seal) if seal is not None else None)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
@@ -73,9 +77,12 @@ def write_run(
     if not yes:
         _show_plan(shown, as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
-    with screen.busy("proving the result, then writing and reading back"):
+    with screen.busy("proving the result") as say:
         done = write.write_run(
-            request, shown.token if token is None else token, read_key(seal) if seal is not None else None
+            request,
+            shown.token if token is None else token,
+            read_key(seal) if seal is not None else None,
+            _telling(say),
         )
     report = done.report
     if as_json:
@@ -86,6 +93,26 @@ def write_run(
     screen.out.print(f"[green]{len(report.written)} parameters written, {screen.kept(report.is_stored)}[/]")
     if report.wear_fraction is not None and report.store_count_after is not None:
         screen.out.print(screen.wear(report.store_count_after, report.wear_fraction))
+
+
+_DOING = {
+    Action.STAGE: "staging the values, nothing is in use yet", Action.COMMIT: "bringing them into use, reading back",
+    Action.STORE: "storing them, reading back",
+}  # fmt: skip
+
+
+def _telling(say: Callable[[str], None]) -> Observe:
+    """Each record of a proof or a write in words, as it comes."""
+
+    def tell(record: object) -> None:
+        if isinstance(record, Decided):
+            say(f"proving: decision {record.number} of {record.of}, nothing is sent")
+        elif isinstance(record, WritingBegan):
+            say(f"comparing what {record.drive} holds")
+        elif isinstance(record, Intent) and record.action in _DOING:
+            say(_DOING[record.action])
+
+    return tell
 
 
 def _show_written(request: write.RunRequest, written: Sequence[WrittenParameter]) -> None:
@@ -136,8 +163,8 @@ def diagnose_run(runs: Path, run: str, seconds: float | None, *, seal: Path | No
 def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
     """Decide the run again from its archive; exit 3 where the folder is not as the run left it, or a decision comes out
     otherwise."""
-    with screen.busy("deciding again"):
-        done, verified = archive.replay_run(runs, run, salvage=salvage)
+    with screen.busy("deciding again") as say:
+        done, verified = archive.replay_run(runs, run, salvage=salvage, observe=_telling(say))
     if as_json:
         screen.emit(done)
         if not done.identical:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from commissioner.text import counted
 
 SHOWN = 50
 """Rows of a list for a person, unless another number is given."""
+BESIDE = 46
+"""Characters that the columns beside a run's id need; with less its facts stand below it."""
 
 
 def find(archive: Archive, wanted: Wanted, limit: int | None, out: Path | None, *, as_json: bool) -> None:
@@ -45,12 +48,19 @@ def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
          screen.text(row.person), row.holds)
         for row in found.rows
     ]  # fmt: skip
+    if max(len(row.run) for row in found.rows) > screen.out.width - BESIDE:
+        screen.stacked_rows(rows)
+    else:
+        _as_table(rows)
+    if (more := found.total - len(rows)) > 0:
+        screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
+
+
+def _as_table(rows: Sequence[tuple[str, ...]]) -> None:
     header = ("run", "outcome", "motor", "drive", "person", "holds")
     told = len(header) if any(row[-1] for row in rows) else len(header) - 1
     least = screen.outcome_width(header)
     screen.out.print(screen.table("", header[:told], [row[:told] for row in rows], widths=least))
-    if (more := found.total - len(rows)) > 0:
-        screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
 
 
 def write_table(archive: Archive, out: Path, *, as_json: bool, wanted: Wanted) -> None:

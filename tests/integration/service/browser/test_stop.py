@@ -110,3 +110,8 @@ def test_a_page_that_has_lost_the_service_says_what_it_cannot_do(browser, tmp_pa
         hand.page.locator("#stop").click()
         expect(hand.page.locator("#stopsub")).to_have_text("cannot be sent: use the emergency stop")
         assert hand.violations() == []
+        with ServiceProcess(
+            tmp_path, port=service.port
+        ):  # the page stood there as of a test in progress, its data older and older
+            expect(hand.page.locator("#livedata")).to_have_count(0, timeout=SLOW_MS)
+            assert "in progress" not in hand.page.locator("h1").inner_text()

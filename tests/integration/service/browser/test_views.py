@@ -64,7 +64,7 @@ def test_no_view_has_a_violation_or_hides_stop(service, browser, shelf):
                     found.append(
                         f"{name} at {size}: {hand.overflow()} px too wide, STOP in view: {hand.stop_is_in_view()}"
                     )
-            hand.size("1280")
+            found.extend(f"{name}: {fault}" for fault in hand.faults_on_paper())
             for scheme, rules in (("dark", CONTRAST), ("light", AXE_RULES)):
                 hand.page.emulate_media(color_scheme=scheme)
                 found.extend(f"{name}, {scheme}: {violation}" for violation in hand.violations(rules))

@@ -42,7 +42,7 @@ async function energise() {
       location.assign(said.url);
       return;
     }
-    message.textContent = [said.title, said.remedy].filter(Boolean).join(". ");
+    message.textContent = [said.title, said.remedy].filter(Boolean).map((text) => text[0].toUpperCase() + text.slice(1)).join(". ");
   } catch (failure) {
     message.textContent = String(failure);
   }

@@ -18,7 +18,8 @@ export const number = (value, digits, unit = "") => {
 const root = document.documentElement;
 const place = document.body.dataset;
 const OFFLINE_MS = 1500,
-  RETRY_MS = 500;
+  RETRY_MS = 500,
+  ONCE_MS = 5000;
 let socket = null,
   heardAt = performance.now(),
   wasLive = root.dataset.level === "live" || root.dataset.level === "alarm";
@@ -70,7 +71,7 @@ setInterval(() => {
 }, 250);
 
 /* ---- the band ---------------------------------------------------------------------------------------------------- */
-const put = (id, text) => {
+export const put = (id, text) => {
   const node = document.getElementById(id);
   if (node.textContent !== text) node.textContent = text;
 };
@@ -96,6 +97,7 @@ function showBand(band) {
   }
   wasLive = band.level === "live" || band.level === "alarm";
   if (place.run && band.run === place.run) follow(band.phase);
+  else if (place.run && $("#livedata, #tuning")) follow("ended"); // a service that was begun anew knows it as one that was cut off
 }
 export function level(name) {
   if (root.dataset.level === name) return;
@@ -146,9 +148,13 @@ async function follow(phase) {
 /* the work of this page as the service shows it now, where `isWanted` says so of it */
 export async function renew(isWanted = () => true) {
   const answer = await fetch(location.href, { headers: { accept: "text/html" } });
-  if (!answer.ok) return true;
-  const next = new DOMParser().parseFromString(await answer.text(), "text/html");
+  return showPage(await answer.text(), isWanted);
+}
+/* the work of another page in this one's place; band and STOP stay */
+export function showPage(html, isWanted = () => true) {
+  const next = new DOMParser().parseFromString(html, "text/html");
   if (!isWanted(next)) return false;
+  if (!next.querySelector("#main")) return true;
   for (const selector of ["#main", "#steps"]) {
     const fresh = next.querySelector(selector),
       old = $(selector);
@@ -235,7 +241,10 @@ document.addEventListener(
 /* ---- small helpers of forms -------------------------------------------------------------------------------------- */
 document.addEventListener("submit", (event) => {
   const busy = event.target.dataset?.busy;
-  if (busy) {
+  if (busy && event.target.dataset.sent) event.preventDefault(); // pressed twice: once is enough
+  else if (busy) {
+    event.target.dataset.sent = "yes";
+    setTimeout(() => delete event.target.dataset.sent, ONCE_MS); // where its answer was given up it may be pressed again
     const button = event.target.querySelector("button");
     button.textContent = busy;
     put("say", busy);
