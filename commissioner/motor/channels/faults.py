@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
+from commissioner.motor.channels.closing import Behind, currents_behind
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
 from commissioner.motor.channels.rows import held, lost, written_twice
@@ -80,6 +81,26 @@ def put_on_time(one: StandstillRecording) -> StandstillRecording:
         one, time_s=one.time_s[~ends], segment=one.segment[~ends], axis_deg=one.axis_deg[~ends], voltage_axis_v=one.voltage_axis_v[~ends],
         current_u_a=u, current_v_a=v, current_w_a=w, dc_link_v=None if one.dc_link_v is None else one.dc_link_v[~ends], notes=(*one.notes, note),
     )  # fmt: skip
+
+
+def currents_on_time(
+    one: RunningRecording, rated_voltage_peak_v: float, *, by_whole_rows: bool = False
+) -> tuple[RunningRecording, Behind | None]:
+    """The recording with its currents shifted by what a closing shows them to be behind the voltages, a note of it, and what was seen;
+    `by_whole_rows`: to the nearest row, of which no noise is changed and a fit takes the rest."""
+    seen = currents_behind(one, rated_voltage_peak_v)
+    if seen is None or not seen.is_told:
+        return one, seen
+    rows = seen.late_s / one.sample_period_s
+    rows = round(rows) if by_whole_rows else rows
+    if rows == 0.0:
+        return one, seen
+    gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
+    u, v, w = (np.concatenate([shifted(p, rows) for p in np.split(x, gaps)]) for x in one.currents_a)
+    ends = [~np.isfinite(x) & np.isfinite(before) for x, before in zip((u, v, w), one.currents_a, strict=True)]
+    what = f"{seen.words}: shifted back{' by whole rows' if by_whole_rows else ''}"
+    mended = replace(one, currents_a=(u, v, w), notes=(*one.notes, ReadingNote(LATE, what)))
+    return _without_ends(mended, np.any(ends, axis=0)), seen
 
 
 def without_clipped(one: RunningRecording) -> tuple[RunningRecording, list[str]]:
