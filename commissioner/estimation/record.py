@@ -13,7 +13,7 @@ from scipy.signal import savgol_filter
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
-from commissioner.motor.channels.clock import off_mains, wrong_unit
+from commissioner.motor.channels.clock import off_mains, turning_hz, wrong_unit
 from commissioner.motor.channels.faults import no_lines, without_clipped
 from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.motor.computed import is_negative_sum
@@ -116,7 +116,7 @@ class Window:
 class Record:
     """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `is_renewed`: a row for each voltage that
     the inverter makes; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
-    of the electrical speed before smoothing."""
+    of the electrical speed before smoothing; `mains_hz`: the supply's frequency, None of an inverter, or where it moves."""
 
     windows: tuple[Window, ...]
     period_s: float
@@ -129,6 +129,7 @@ class Record:
     sigma_a: tuple[float, float, float]
     sigma_v: float
     sigma_w: float = 0.0
+    mains_hz: float | None = None
     remarks: tuple[str, ...] = ()
     computed: str = ""
     not_started: tuple[str, ...] = ()
@@ -181,6 +182,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     remarks: list[str] = []
     standing_still: list[str] = []
     clipped: list[str] = []
+    supplies: list[float] = []
     has_speed, said_of_speed = _has_speed(recordings)
     remarks += said_of_speed
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
@@ -228,7 +230,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
-        own, of_windows = _checked(own, one, _supply_hz(one, voltage, scales), has_speed, scales)
+        supplies.append(_supply_hz(one, voltage, scales))
+        own, of_windows = _checked(own, one, supplies[-1], has_speed, scales)
         remarks += of_windows
         windows += own
     if not windows:
@@ -248,9 +251,14 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     return Record(
         tuple(windows), period, scales, plate, has_speed, has_zero, carrier > 0.0, _is_renewed(carrier, period), (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
-        _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
+        _speed_noise(recordings, plate) if has_speed else 0.0, _mains_hz(supplies, carrier), tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _mains_hz(supplies: Sequence[float], carrier_hz: float) -> float | None:
+    """The supply's frequency where all recordings have one and no inverter makes it."""
+    return float(np.mean(supplies)) if carrier_hz == 0.0 and all(hz > 0.0 for hz in supplies) else None
 
 
 def _nothing_left(clipped: Sequence[str], remarks: Sequence[str]) -> DataRefused:
@@ -448,7 +456,20 @@ def _supply_hz(one: RunningRecording, voltage: Array, scales: Scales) -> float:
     if not is_fed.any():
         return 0.0
     least, median, most = np.quantile(turn[is_fed], (0.1, 0.5, 0.9))
-    return float(median) / (2 * np.pi) if most - least < STEADY_TURN * median else 0.0
+    if not most - least < STEADY_TURN * median:
+        return 0.0
+    at = np.flatnonzero(is_fed)
+    first, last = _longest(at) if at.size else (0, 0)
+    block = _block(one)
+    vector = voltage[first * block : last * block] @ np.array([1.0, 1j])
+    return turning_hz(vector, one.sample_period_s, float(median) / (2 * np.pi))
+
+
+def _longest(at: NDArray[np.int64]) -> tuple[int, int]:
+    """First and last + 1 of the longest run of neighbours."""
+    runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
+    run = max(runs, key=len)
+    return int(run[0]), int(run[-1]) + 1
 
 
 def _check_stamps(one: RunningRecording) -> None:

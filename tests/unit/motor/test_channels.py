@@ -7,7 +7,7 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.record import prepare, scales_of
-from commissioner.motor.channels.clock import off_mains
+from commissioner.motor.channels.clock import of_speed_gain, off_mains, turning_hz
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.faults import no_lines, put_on_time, put_right
 from commissioner.motor.channels.late import late, shifted
@@ -282,10 +282,30 @@ def test_another_unit_is_named_for_what_it_is(start, change, says):
 def test_a_supply_that_is_off_the_mains_is_said_and_one_of_an_inverter_is_not(start):
     recording, plate = start
     slow = replace(recording, time_s=1.01 * recording.time_s, sample_period_s=1.01 * recording.sample_period_s)
-    assert any("if it is the mains, the sample period is 1.0 % too long" in r for r in prepare([slow], plate).remarks)
+    # mains of 50.029 Hz by the key
+    assert any("if it is the mains, the sample period is 0.9 % too long" in r for r in prepare([slow], plate).remarks)
     driven = replace(slow, metadata={**slow.metadata, "switching_frequency_hz": 4000.0})
     assert not any("mains" in r for r in prepare([driven], plate).remarks)
     assert off_mains(50.1) is None and off_mains(45.0) is None and "too short" in (off_mains(60.6) or "")
+
+
+def test_a_supply_is_told_beside_its_harmonics_whichever_way_it_turns():
+    """By its turning from sample to sample 2 % of a fifth made it 0.2 % too slow."""
+    turn = 2.0 * np.pi * 49.87 * 2e-4 * np.arange(5000)
+    forward = np.exp(1j * turn) + 0.03 * np.exp(-1j * turn) + 0.03 * np.exp(-5j * turn + 1j) + 0.02 * np.exp(7j * turn)
+    for vector in (forward, forward.conj()):
+        assert turning_hz(vector, 2e-4, 50.3) == pytest.approx(49.87, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("supply_hz", "gain", "whose"),
+    [
+        (49.505, 0.0099, "period"), (60.6, -0.01, "period"), (50.01, 0.01, "sensor"), (60.05, -0.05, "sensor"), (49.85, 0.003, "either"),
+        (50.02, 0.001, "either"), (49.5, 0.03, "either"), (33.0, 0.01, "either"), (None, 0.01, "either"),
+    ],
+)  # fmt: skip
+def test_a_gain_of_the_speed_is_the_sample_periods_where_the_mains_say_so(supply_hz, gain, whose):
+    assert of_speed_gain(supply_hz, gain) == whose
 
 
 def test_without_a_speed_the_rest_of_a_start_is_not_used(start):
