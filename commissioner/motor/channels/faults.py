@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
-from commissioner.motor.channels.closing import Behind, currents_behind
+from commissioner.motor.channels.closing import TURNS, Behind, currents_behind
+from commissioner.motor.channels.drift import DRIVES, drifts_of, supply_hz
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
 from commissioner.motor.channels.rows import held, lost, written_twice
@@ -19,24 +20,28 @@ from commissioner.records import ReadingNote, RunningRecording, Signal, Standsti
 
 PHASES, LINES = ("u", "v", "w"), ("uv", "vw", "wu")
 SPIKES, WRAPPED, LATE, POLARITY = "spikes", "wrapped", "late_channel", "polarity"
-HELD, LOST = "held_rows", "lost_rows"
+HELD, LOST, DRIFT = "held_rows", "lost_rows", "drifting_offset"
 Group = tuple[Signal, Signal, Signal]
 
 
 def put_right(one: RunningRecording) -> RunningRecording:
-    """The recording without wraps, spikes, a turned sign and delays between its channels, with a note of each."""
+    """The recording without wraps, spikes, a turned sign, drifting offsets and delays between its channels, with a note of each."""
     one = _without_held(one)
     _require_once(one)
     one = _with_losses(one)
-    groups: list[Group] = [one.currents_a, one.voltages_v]
-    named = list(zip(("current", "voltage"), (PHASES, names_of_voltages(one)), strict=True))
-    notes, spikes, beyond = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
-    for g, (kind, names) in enumerate(named):
-        channels = list(groups[g])
+    return _with_channels_on_time(_without_drifts(_with_channels_whole(one)))
+
+
+def _with_channels_whole(one: RunningRecording) -> RunningRecording:
+    """The recording with what ran over put back, without spikes, and with a turned channel's sign."""
+    groups: list[Group] = []
+    notes, spikes = list(one.notes), 0
+    for kind, unit, names, group in _groups(one):
+        channels = list(group)
         for k, name in enumerate(names):
             channels[k], span, many = unwrapped(channels[k])
             if many:
-                what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {'AV'[g]} away): put back"
+                what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {unit} away): put back"
                 notes.append(ReadingNote(WRAPPED, what))
             channels[k], count = without_spikes(channels[k])
             spikes += count
@@ -44,17 +49,50 @@ def put_right(one: RunningRecording) -> RunningRecording:
             channels[odd] = -channels[odd]
             what = f"{kind} {names[odd]} is minus what the other two leave for it: its sign was turned (or that of both others)"
             notes.append(ReadingNote(POLARITY, what))
+        groups.append((channels[0], channels[1], channels[2]))
+    if spikes:
+        what = f"{spikes} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
+        notes.append(ReadingNote(SPIKES, what))
+    return replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
+
+
+def _without_drifts(one: RunningRecording) -> RunningRecording:
+    """The recording without what its channels' offsets drift by."""
+    hz = supply_hz(TURNS @ np.nan_to_num(one.voltages_v), one.sample_period_s) if one.sample_period_s > 0.0 else 0.0
+    if not hz > 0.0:
+        return one
+    notes, groups = list(one.notes), []
+    seen = [drifts_of(group, one.time_s, hz) for group in (one.currents_a, one.voltages_v)]
+    flows = max((d.share for d in seen[0] if d), default=0.0)
+    for (kind, unit, names, group), drifts in zip(_groups(one), seen, strict=True):
+        channels = list(group)
+        for k, (name, drift) in enumerate(zip(names, drifts, strict=True)):
+            if drift is not None and (kind == "current" or flows < DRIVES * drift.share):
+                channels[k] = channels[k] - drift.curve
+                notes.append(ReadingNote(DRIFT, f"{drift.said(kind, name, unit)}: taken off"))
+        groups.append((channels[0], channels[1], channels[2]))
+    return replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
+
+
+def _with_channels_on_time(one: RunningRecording) -> RunningRecording:
+    """The recording with the channels of a group that were taken one after another shifted back."""
+    groups: list[Group] = []
+    notes, beyond = list(one.notes), np.zeros(one.time_s.size, dtype=bool)
+    for kind, _, names, group in _groups(one):
+        channels = list(group)
         if seen := late(channels, one.sample_period_s):
             gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
             channels = _shifted_back(channels, seen, gaps, one.sample_period_s)
             notes.append(ReadingNote(LATE, f"{seen.said(kind, names)}: shifted back"))
-            beyond |= ~np.isfinite(channels).all(axis=0) & np.isfinite(groups[g]).all(axis=0)
-        groups[g] = (channels[0], channels[1], channels[2])
-    if spikes:
-        what = f"{spikes} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
-        notes.append(ReadingNote(SPIKES, what))
+            beyond |= ~np.isfinite(channels).all(axis=0) & np.isfinite(group).all(axis=0)
+        groups.append((channels[0], channels[1], channels[2]))
     mended = replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
     return _without_ends(mended, beyond)
+
+
+def _groups(one: RunningRecording) -> tuple[tuple[str, str, tuple[str, str, str], Group], ...]:
+    """(kind, unit, names, channels) of currents and voltages."""
+    return ("current", "A", PHASES, one.currents_a), ("voltage", "V", names_of_voltages(one), one.voltages_v)
 
 
 def put_on_time(one: StandstillRecording) -> StandstillRecording:

@@ -12,6 +12,7 @@ from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.faults import no_lines, put_on_time, put_right
 from commissioner.motor.channels.late import late, shifted
 from commissioner.motor.channels.rows import written_twice
+from commissioner.motor.computed import is_negative_sum
 from commissioner.records import StandstillRecording
 from sim.motoring.recording import record
 from tests.running_effects.cases import Case, as_plate, as_recording, taken
@@ -306,6 +307,51 @@ def test_a_supply_is_told_beside_its_harmonics_whichever_way_it_turns():
 )  # fmt: skip
 def test_a_gain_of_the_speed_is_the_sample_periods_where_the_mains_say_so(supply_hz, gain, whose):
     assert of_speed_gain(supply_hz, gain) == whose
+
+
+def with_drift(recording, kind, k, by, time_s=0.0):
+    """The offset of channel k drifts by so much, along a line or exponentially in `time_s`."""
+    share = recording.time_s / recording.time_s[-1]
+    if time_s:
+        share = (1.0 - np.exp(-recording.time_s / time_s)) / (1.0 - np.exp(-recording.time_s[-1] / time_s))
+    return with_channel(recording, kind, k, lambda *three: three[k] + by * share)
+
+
+@pytest.mark.parametrize(
+    ("kind", "by", "time_s"), [("currents_a", 0.5, 0.0), ("currents_a", -2.5, 1.0), ("voltages_v", 3.3, 0.0)]
+)
+def test_an_offset_that_drifts_is_taken_off_and_said(start, kind, by, time_s):
+    """1 % of the rated peak ended as `unexplained`, or as a gain, a bad line and channels 8 us late."""
+    recording, _ = start
+    mended = put_right(with_drift(recording, kind, 1, by, time_s))
+    (note,) = mended.notes
+    assert (
+        note.code == "drifting_offset"
+        and f"drifts by {'-' if by < 0.0 else '+'}" in note.what
+        and "taken off" in note.what
+    )
+    off = getattr(mended, kind)[1] - getattr(recording, kind)[1]
+    assert np.ptp(off) < 0.12 * abs(by) and ("exponentially" in note.what) == (time_s > 0.0)
+
+
+def test_what_a_motor_or_a_ramp_or_a_voltage_that_drives_it_does_is_no_drift(start):
+    recording, _ = start
+    decays = 5.0 * np.exp(-recording.time_s / 0.5)
+    u, v, w = recording.currents_a
+    assert put_right(replace(recording, currents_a=(u + decays, v - 0.5 * decays, w - 0.5 * decays))).notes == ()
+    direct = with_drift(with_drift(recording, "voltages_v", 0, 3.0), "currents_a", 0, 20.0)
+    assert all("voltage" not in n.what for n in put_right(direct).notes)
+    ramp, _, _ = taken(Case(5101, "null", "ramp").scenario(), 5101)
+    assert put_right(ramp).notes == ()
+
+
+def test_a_third_current_that_was_computed_stays_so_where_another_drifts_and_two_are_enough(start):
+    recording, _ = start
+    u, v = (np.round(x, 3) for x in with_drift(recording, "currents_a", 1, 1.0).currents_a[:2])
+    mended = put_right(replace(recording, currents_a=(u, v, np.round(-(u + v), 3))))
+    assert [n.code for n in mended.notes] == ["drifting_offset"] * 2 and is_negative_sum(*mended.currents_a)
+    two = put_right(replace(recording, currents_a=(u, v, np.full(u.size, np.nan))))
+    assert [n.what.split(" drifts")[0] for n in two.notes] == ["the offset of current v"]
 
 
 def test_without_a_speed_the_rest_of_a_start_is_not_used(start):
