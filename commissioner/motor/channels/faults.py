@@ -15,6 +15,7 @@ from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
 from commissioner.motor.channels.rows import held, lost, written_twice
 from commissioner.motor.channels.spikes import without_spikes
+from commissioner.motor.channels.stamps import with_even_time
 from commissioner.motor.channels.sums import OpenSum, open_sum
 from commissioner.records import ReadingNote, RunningRecording, Signal, StandstillRecording
 
@@ -26,6 +27,7 @@ Group = tuple[Signal, Signal, Signal]
 
 def put_right(one: RunningRecording) -> RunningRecording:
     """The recording without wraps, spikes, a turned sign, drifting offsets and delays between its channels, with a note of each."""
+    one = with_even_time(one, TURNS @ np.array(one.voltages_v)) if one.sample_period_s > 0.0 else one
     one = _without_held(one)
     _require_once(one)
     one = _with_losses(one)
