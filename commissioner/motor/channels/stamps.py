@@ -29,6 +29,10 @@ SURE, NEAR = 0.1, 0.3
 """Standard deviation of the share of the stamps' wandering that the voltage shows; how near to none or all of it."""
 
 
+OF_SLOPE, SLOPE_KNOWN = 3.5, 2e-5
+"""Of a straight line's slope, whose points move together (sqrt 12); its relative error, with which the sample period of wrong stamps is known."""
+SAME_PERIOD = 0.01
+"""By which one that the recording names may differ from it."""
 SLOW, PASSES = 0.02, 4
 """Change from stamp to stamp, rms of a sample period, of a clock that wanders; more is jitter."""
 REACH, STAYS = 8, 0.6
@@ -63,6 +67,11 @@ def with_even_time(one: RunningRecording, vector: Vector) -> RunningRecording:
         return one
     wander = f"the time stamps wander by {rms:.2g} sample periods rms"
     if share.value < 0.5:
+        named = one.metadata.get("sample_period_s")
+        if isinstance(named, float) and abs(named / period - 1.0) < SAME_PERIOD:
+            even, period = time[0] + first + named * np.arange(rows), named
+        elif _slow_rms(off) * OF_SLOPE / rows > SLOPE_KNOWN:
+            return one
         what = f"{wander}, the samples do not (the voltage turns evenly from one to the next): taken at even steps of {period:.6g} s"
         return replace(one, time_s=even, sample_period_s=period, notes=(*one.notes, ReadingNote(STAMPS, what)))
     at = _places(off)
@@ -110,6 +119,11 @@ def _slope(turn: Array, moved: Array) -> _Share | None:
         return None
     without = (products.sum() - products) / np.maximum(squares.sum() - squares, 1e-300)
     return _Share(float(products.sum() / squares.sum()), float(np.sqrt((PARTS - 1) * without.var())))
+
+
+def _slow_rms(off: Array) -> float:
+    """Of what the stamps are off by over a thirtieth of the recording."""
+    return float(np.std([part.mean() for part in np.array_split(off, 30)]))
 
 
 def _has_lost_rows(steps: Array) -> bool:

@@ -1,5 +1,7 @@
 """Stamps that wander: the voltage tells whether the samples do as well; truth is the wave in closed form at even steps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,7 @@ def stamped(one, stamps):
 def test_samples_are_brought_to_even_steps_where_the_voltage_says_that_they_wander_with_their_stamps(off, is_true):
     """Refused as `clock_jitter`, or as time that does not run forward."""
     one = stamped(wave(EVEN + off if is_true else EVEN, 1e-3), EVEN + off)
+    one = replace(one, metadata={"sample_period_s": PERIOD})
     mended = put_right(one)
     (note,) = mended.notes
     assert note.code == "wandering_stamps" and ("with them" in note.what) == is_true
@@ -51,6 +54,14 @@ def test_samples_are_brought_to_even_steps_where_the_voltage_says_that_they_wand
     for group, of, size in ((mended.currents_a, true.currents_a, 10.0), (mended.voltages_v, true.voltages_v, 325.0)):
         error = np.array(group)[:, inside] - np.array(of)[:, inside]
         assert np.std(error) < 2.5e-3 * size
+
+
+def test_how_long_a_sample_period_is_no_stamps_tell_that_wander_for_themselves():
+    """1478.07 +- 0.15 rev/min were said of 1479.0."""
+    for off, is_known in ((slow(0.01), False), (jitter(0.3), True)):
+        mended = put_right(stamped(wave(EVEN, 1e-3), EVEN + off))
+        assert bool(mended.notes) is is_known
+        assert not is_known or mended.sample_period_s == pytest.approx(PERIOD, rel=2e-5)
 
 
 def test_the_noise_of_channels_that_were_brought_to_even_steps_is_what_it_was():
