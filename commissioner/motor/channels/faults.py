@@ -39,23 +39,38 @@ def _with_channels_whole(one: RunningRecording) -> RunningRecording:
     groups: list[Group] = []
     notes, spikes = list(one.notes), 0
     for kind, unit, names, group in _groups(one):
-        channels = list(group)
-        for k, name in enumerate(names):
-            channels[k], span, many = unwrapped(channels[k])
-            if many:
-                what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {unit} away): put back"
-                notes.append(ReadingNote(WRAPPED, what))
-            channels[k], count = without_spikes(channels[k])
-            spikes += count
-        if (odd := _turned(channels, kind, names)) is not None:
-            channels[odd] = -channels[odd]
-            what = f"{kind} {names[odd]} is minus what the other two leave for it: its sign was turned (or that of both others)"
-            notes.append(ReadingNote(POLARITY, what))
+        channels, own, count = _whole(group, kind, unit, names)
         groups.append((channels[0], channels[1], channels[2]))
-    if spikes:
-        what = f"{spikes} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
-        notes.append(ReadingNote(SPIKES, what))
-    return replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
+        notes, spikes = notes + own, spikes + count
+    return replace(one, currents_a=groups[0], voltages_v=groups[1], notes=(*notes, *_of_spikes(spikes)))
+
+
+def _whole(
+    group: Sequence[Signal], kind: str, unit: str, names: Sequence[str], cuts: Sequence[int] = ()
+) -> tuple[list[Signal], list[ReadingNote], int]:
+    """(channels with what ran over put back, without spikes, and of three with a turned one's sign; notes; how many spikes). `cuts`: first rows behind a pause."""
+    channels, notes, spikes = list(group), [], 0
+    for k, name in enumerate(names):
+        parts = [unwrapped(part) for part in np.split(channels[k], cuts)]
+        span, many = max(p[1] for p in parts), sum(p[2] for p in parts)
+        channels[k] = np.concatenate([p[0] for p in parts]) if many else channels[k]
+        if many:
+            what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {unit} away): put back"
+            notes.append(ReadingNote(WRAPPED, what))
+        channels[k], count = without_spikes(channels[k])
+        spikes += count
+    if len(channels) == len(PHASES) and (odd := _turned(channels, kind, names)) is not None:
+        channels[odd] = -channels[odd]
+        what = f"{kind} {names[odd]} is minus what the other two leave for it: its sign was turned (or that of both others)"
+        notes.append(ReadingNote(POLARITY, what))
+    return channels, notes, spikes
+
+
+def _of_spikes(count: int) -> tuple[ReadingNote, ...]:
+    if not count:
+        return ()
+    what = f"{count} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
+    return (ReadingNote(SPIKES, what),)
 
 
 def _without_drifts(one: RunningRecording) -> RunningRecording:
@@ -95,6 +110,22 @@ def _with_channels_on_time(one: RunningRecording) -> RunningRecording:
 def _groups(one: RunningRecording) -> tuple[tuple[str, str, tuple[str, str, str], Group], ...]:
     """(kind, unit, names, channels) of currents and voltages."""
     return ("current", "A", PHASES, one.currents_a), ("voltage", "V", names_of_voltages(one), one.voltages_v)
+
+
+def put_right_at_rest(one: StandstillRecording) -> StandstillRecording:
+    """A recording at standstill without wraps, spikes, a turned sign and delays between its currents, with a note of each. Of rows that are means
+    over several periods it is not asked."""
+    if one.averaged is not None:
+        return one
+    group = [one.current_u_a, one.current_v_a, *([] if one.current_w_a is None else [one.current_w_a])]
+    (u, v, *rest), notes, spikes = _whole(
+        group, "current", "A", PHASES[: len(group)], (np.flatnonzero(np.diff(one.segment)) + 1).tolist()
+    )
+    notes += _of_spikes(spikes)
+    if notes:
+        w = rest[0] if rest else None
+        one = replace(one, current_u_a=u, current_v_a=v, current_w_a=w, notes=(*one.notes, *notes))
+    return put_on_time(one)
 
 
 def put_on_time(one: StandstillRecording) -> StandstillRecording:

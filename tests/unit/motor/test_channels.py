@@ -9,9 +9,10 @@ from commissioner.errors import DataRefused
 from commissioner.estimation.record import prepare, scales_of
 from commissioner.motor.channels.clock import of_speed_gain, off_mains, turning_hz
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
-from commissioner.motor.channels.faults import no_lines, put_on_time, put_right
+from commissioner.motor.channels.faults import no_lines, put_on_time, put_right, put_right_at_rest
 from commissioner.motor.channels.late import late, shifted
 from commissioner.motor.channels.rows import written_twice
+from commissioner.motor.channels.spikes import without_spikes
 from commissioner.motor.computed import is_negative_sum
 from commissioner.records import StandstillRecording
 from sim.motoring.recording import record
@@ -396,3 +397,42 @@ def test_the_other_half_of_a_period_is_no_copy():
     lines = [np.cos(2.0 * np.pi * 50.0 * time_s - k * 2.0944) for k in range(6)]
     half = [np.where(time_s < 0.01, x, -np.roll(x, 50)) for x in lines]  # to the bit, as no noise would leave it
     assert written_twice([x[:100] for x in half], np.ones(100, bool)) is None
+
+
+@pytest.fixture
+def at_rest():
+    """Tones along three axes in turn at 5 kHz; one channel carries next to nothing along the first."""
+    period, rng = 2e-4, np.random.default_rng(9)
+    time = period * np.arange(9000)
+    wave = 2.0 * np.sin(50.0 * time) + 0.8 * np.sin(400.0 * time) + 0.2 * np.sin(1700.0 * time)
+    axis = np.repeat([90.0, 30.0, 150.0], 3000)
+    turns = np.deg2rad(axis[:, None] - [0.0, 120.0, 240.0])
+    u, v, w = (np.round(wave * np.cos(turn) + 1e-3 * rng.standard_normal(time.size), 3) for turn in turns.T)
+    return StandstillRecording(time, np.repeat([0, 1, 2], 3000), axis, wave, u, v, w, None, period)
+
+
+def test_spikes_wraps_and_a_turned_sensor_at_standstill_are_put_right_as_of_a_running_motor(at_rest):
+    assert put_right_at_rest(at_rest) is at_rest
+    spiked, rows = at_rest.current_v_a.copy(), np.array([700, 4100, 8200])
+    spiked[rows] += 5.0
+    for changed, code, close in (
+        ({"current_v_a": spiked}, "spikes", 0.02),
+        ({"current_w_a": wrapped(at_rest.current_w_a, 2.0)}, "wrapped", 1e-3),
+        ({"current_u_a": -at_rest.current_u_a}, "polarity", 0.0),
+    ):
+        for one in (at_rest, replace(at_rest, current_w_a=None)):
+            if one.current_w_a is None and code != "spikes":
+                continue
+            mended = put_right_at_rest(replace(one, **changed))
+            assert [n.code for n in mended.notes] == [code]
+            (name,) = changed
+            np.testing.assert_allclose(getattr(mended, name), getattr(at_rest, name), atol=close)
+    assert put_right_at_rest(replace(at_rest, averaged=np.ones(9000, dtype=int), current_v_a=spiked)).notes == ()
+
+
+def test_a_converters_step_in_a_channel_without_current_is_no_spike():
+    x = np.zeros(5000)
+    x[::300] = 0.01
+    assert without_spikes(x)[1] == 0
+    x[1000:1003] = (0.0, 5.0, 0.0)
+    assert without_spikes(x)[1] == 1
