@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.record import prepare, scales_of
@@ -436,3 +437,30 @@ def test_a_converters_step_in_a_channel_without_current_is_no_spike():
     assert without_spikes(x)[1] == 0
     x[1000:1003] = (0.0, 5.0, 0.0)
     assert without_spikes(x)[1] == 1
+
+
+def low_passed(x, time_s, period_s):
+    """First order, by its exponential (the trapezoidal rule between samples of 25 us)."""
+    a = np.exp(-period_s / time_s)
+    return lfilter([0.5 * (1.0 - a)] * 2, [1.0, -a], x)
+
+
+@pytest.mark.parametrize(
+    ("time_s", "filtered", "noise", "says"),
+    [
+        (4e-4, True, 0.02, "passes a low pass of"), (4e-4, False, 0.02, "taken one after another)"), (1e-4, True, 0.4, "or a low pass)"),
+        (1e-4, False, 0.4, "or a low pass)"),
+    ],
+)  # fmt: skip
+def test_a_low_pass_in_one_channel_is_told_from_a_delay_where_noise_does_not_hide_what_they_differ_by(
+    without_noise, time_s, filtered, noise, says
+):
+    recording, _ = without_noise
+    period = recording.sample_period_s
+    if filtered:
+        one = with_channel(recording, "currents_a", 1, lambda u, v, w: low_passed(v, time_s, period))
+        one = taken_at(one, "currents_a", (0, 0, 0), noise=noise)
+    else:
+        one = taken_at(recording, "currents_a", (0, round(time_s / period), 0), noise=noise)
+    (note,) = put_right(one).notes
+    assert says in note.what and note.what.endswith(": shifted back")
