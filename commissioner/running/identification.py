@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.checks import BLOCK_S
 from commissioner.estimation.fit import (
     INERTIA,
     Column,
@@ -30,7 +31,7 @@ from commissioner.estimation.hidden import by_laws, drawn_aside, told_in, with_t
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import BLOCK_S, STATES, Record, first_part, prepare, scales_of
+from commissioner.estimation.record import STATES, Record, first_part, prepare, scales_of
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.channels.faults import currents_on_time
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
