@@ -11,11 +11,27 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.checks import (
+    BLOCK_S,
+    JUMP,
+    JUMP_SIGMA,
+    LEAST_S,
+    MOST_JUMPS,
+    OFF_CURRENT,
+    OFF_VOLTAGE,
+    check,
+    check_lines,
+    check_order,
+    check_sizes,
+    hz_of_supply,
+    is_crossed,
+    noise_of,
+    refused,
+)
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
-from commissioner.motor.channels.clock import off_mains, wrong_unit
-from commissioner.motor.channels.faults import no_lines, without_clipped
-from commissioner.motor.channels.levels import current_level, voltage_level
+from commissioner.motor.channels.clock import off_mains
+from commissioner.motor.channels.faults import without_clipped
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -35,35 +51,14 @@ STEADY_SHARE = 0.95
 """Of the samples of one steady load: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 ONE_LOAD = 0.1
 """Of the current a volt, by which it stays the same load: flicker of 2 % in the mains of a motor that saturates moved it by 0.07."""
-BLOCK_S = 0.02
 OPENING_S = 0.01
 """Before a contactor has opened: each pole waits for the zero of its own current."""
 FIELD_S = 2e-3
 """Of voltage without current before a closing: the field of a motor that still turns."""
-JUMP, JUMP_SIGMA, MOST_JUMPS = 0.05, 12.0, 20
-"""Of rated peak and of what is usual in this voltage: what its neighbours do not foretell was switched between two samples, and when is
-not known: the fit begins anew. More samples than so many are another kind of voltage."""
-OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
-"""Of rated peak: below both the contactor is open."""
 OPEN = 0.15
 """Of rated peak: what the other phases carry where one is open."""
-LAG_DEG = (-15.0, 100.0)
-"""By which a motor's currents lag while it starts; of one that may generate up to 180 degrees more than the least."""
-READ_AS = (
-    ("all turned round", 180.0), ("v, w, u as u, v, w", 120.0), ("w, u, v as u, v, w", -120.0), ("v, w, u as u, v, w and turned round", -60.0),
-    ("w, u, v as u, v, w and turned round", 60.0),
-)  # fmt: skip
-"""Other readings of three currents, and the degrees by which they lag more in them."""
 RUN_OUT_S = 0.1
 """From where the current of a start has fallen to twice the rated one until the shaft is near its speed."""
-LEAST_FED = 0.003
-"""Of the rated current, at a voltage however low."""
-WANDERS = 0.1
-"""Of a sample period, by which half of the stamps are off a whole number of them."""
-STEADY_TURN = 0.05
-"""Of the supply's frequency, within which it is one."""
-MOST_LOCKED = 10.0
-"""Locked-rotor current over the rated one, at rated voltage."""
 STARTS = 2.0
 """Of the usual current: what flows in a start at least."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
@@ -72,22 +67,8 @@ CARRIER = "switching_frequency_hz"
 """Of the inverter, whose rows' voltages are read by it: what is played by them is to be read so as well."""
 RENEWALS, RENEWED_TO = (1, 2), 0.02
 """Rows a carrier period where each has its own voltage, which an inverter renews once or twice a period; how near to that."""
-LEAST_S, LEAST_RATE = 0.2, 40.0
-"""Shortest window; fewest samples a period of the supply."""
-AS_NAMED = 0.99
-"""Of that rate: 2 kHz at 50 Hz are 39.99 where the mains stand a little above."""
-LEAST_SAMPLES = 50
-"""Of a file: fewer tell neither noise nor the supply's turning."""
-MONITORED_S, MONITORED_RATE = 2.0, 10.0
-"""Shortest steady stretch and fewest samples a period that `monitor` reads: it asks for less than a fit of the current's own course."""
-FAST_HZ = 5000.0
-"""Rate that shows a start's first milliseconds at the supplies of 50 and 60 Hz."""
 MOST_SAMPLES = 60_000
 """Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
-MOST_OVER_FIELD = 1.5
-"""Speed of a shaft over that of its field, beyond which it is in another unit: a load that drives takes a motor some per cent over, breakdown a fifth."""
-NOISY_VOLTAGE = 0.15
-"""Sample-to-sample noise over rated peak beyond which a voltage is pulses, not a waveform."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +97,7 @@ class Window:
 class Record:
     """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `is_renewed`: a row for each voltage that
     the inverter makes; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
-    of the electrical speed before smoothing."""
+    of the electrical speed before smoothing; `mains_hz`: the supply's frequency, None of an inverter, or where it moves."""
 
     windows: tuple[Window, ...]
     period_s: float
@@ -129,6 +110,7 @@ class Record:
     sigma_a: tuple[float, float, float]
     sigma_v: float
     sigma_w: float = 0.0
+    mains_hz: float | None = None
     remarks: tuple[str, ...] = ()
     computed: str = ""
     not_started: tuple[str, ...] = ()
@@ -181,6 +163,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     remarks: list[str] = []
     standing_still: list[str] = []
     clipped: list[str] = []
+    supplies: list[float] = []
     has_speed, said_of_speed = _has_speed(recordings)
     remarks += said_of_speed
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
@@ -189,18 +172,18 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     for one in recordings:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
             what = f"{one.source}: sampled at another rate than the first file"
-            raise _refused(what, one.sample_period_s, period, "diagnose them one by one")
-        _check(one, _voltages(one), scales)
+            raise refused(what, one.sample_period_s, period, "diagnose them one by one")
+        check(one, _voltages(one), scales)
         one, cut_off = without_clipped(one)  # noqa: PLW2901
         remarks += cut_off
         clipped += cut_off
         current, voltage = _currents(one), _voltages(one)
-        _check_lines(one, voltage, scales)
+        check_lines(one, voltage, scales)
         open_phases = _open_phases(one, current, scales)
         is_open: Bools = np.asarray(open_phases.any(axis=0))
         sigmas.append([*(noise_of(current[:, k]) for k in range(3)), noise_of(voltage[:, 0]), noise_of(voltage[:, 1])])
-        if _is_crossed(np.where(is_open[:, None], 0.0, current), voltage, scales):
-            raise _refused(
+        if is_crossed(np.where(is_open[:, None], 0.0, current), voltage, scales):
+            raise refused(
                 f"{one.source}: currents and voltages turn against each other",
                 "opposite",
                 "one phase order",
@@ -228,7 +211,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
-        own, of_windows = _checked(own, one, _supply_hz(one, voltage, scales), has_speed, scales)
+        supplies.append(hz_of_supply(one, voltage, scales))
+        own, of_windows = _checked(own, one, supplies[-1], has_speed, scales)
         remarks += of_windows
         windows += own
     if not windows:
@@ -248,19 +232,24 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     return Record(
         tuple(windows), period, scales, plate, has_speed, has_zero, carrier > 0.0, _is_renewed(carrier, period), (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
-        _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
+        _speed_noise(recordings, plate) if has_speed else 0.0, _mains_hz(supplies, carrier), tuple(remarks), "".join(sorted(without)),
         tuple(standing_still),
     )  # fmt: skip
+
+
+def _mains_hz(supplies: Sequence[float], carrier_hz: float) -> float | None:
+    """The supply's frequency where all recordings have one and no inverter makes it."""
+    return float(np.mean(supplies)) if carrier_hz == 0.0 and all(hz > 0.0 for hz in supplies) else None
 
 
 def _nothing_left(clipped: Sequence[str], remarks: Sequence[str]) -> DataRefused:
     """Why there is no window: what was left out of it, or that there was none."""
     if clipped:
         what = f"{' '.join(clipped)} Nothing long enough is left between them."
-        return _refused(
+        return refused(
             what, f"less than {LEAST_S} s", f"{LEAST_S} s", "record with a larger range; a filter or a gain before the converter may have the smaller one"
         )  # fmt: skip
-    return _refused(
+    return refused(
         " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
         0.0,
         f"{LEAST_S} s",
@@ -285,8 +274,8 @@ def _checked(
     said: list[str] = []
     if not has_speed:
         own, said = _behind_run_ups(own, one, scales)
-    _check_order(own, one.source)
-    _check_sizes(own, one, supply_hz, scales)
+    check_order(own, one.source)
+    check_sizes(own, one, supply_hz, scales)
     if not _carrier_hz(one) and (of_mains := off_mains(supply_hz)):
         said.append(f"{one.source}: {of_mains}.")
     return own, said
@@ -319,7 +308,7 @@ def _carrier_hz(one: RunningRecording) -> float:
     named = one.metadata.get(CARRIER) or 0.0
     if isinstance(named, int | float) and 0.0 <= named < np.inf:
         return float(named)
-    raise _refused(
+    raise refused(
         f"{one.source}: {CARRIER} is no frequency", named, "a number of Hz, 0 or none on the mains",
         "write the inverter's carrier frequency in Hz, or leave the line out",
     )  # fmt: skip
@@ -354,17 +343,6 @@ def _step_of(x: Array) -> float:
     return float(np.quantile(d, 0.05)) if d.size else 0.0
 
 
-def _refused(what: str, value: object, limit: object, remedy: str) -> DataRefused:
-    return DataRefused(what, step="read running recording", value=value, limit=limit, remedy=remedy)
-
-
-def noise_of(x: Array) -> float:
-    """Standard deviation of white noise from sixth differences, which no harmonic of the supply passes (robust)."""
-    d = np.diff(x, 6)
-    d = d[np.isfinite(d)]
-    return float(np.median(np.abs(d)) / 0.6745 / np.sqrt(924.0)) if d.size else 0.0
-
-
 def _currents(one: RunningRecording) -> Array:
     phases = np.array(one.currents_a)
     absent = [k for k in range(3) if not np.isfinite(phases[k]).any()]
@@ -389,124 +367,6 @@ def _vector(x: Array) -> Array:
     return np.stack([(2 * u - v - w) / 3.0, (v - w) / np.sqrt(3.0), (u + v + w) / 3.0], axis=1)
 
 
-def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
-    per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
-    if one.time_s.size < LEAST_SAMPLES:
-        raise _refused(
-            f"{one.source}: {one.time_s.size} samples are no recording", one.time_s.size, f"{LEAST_SAMPLES} samples, and {LEAST_S} s of a motor that is fed",
-            "record a start, load steps, or a second of steady running",
-        )  # fmt: skip
-    supply_hz = _supply_hz(one, voltage, scales)
-    if (unit := wrong_unit(supply_hz, scales.frequency_rad_per_s / (2 * np.pi))) is not None:
-        raise _refused(
-            f"{one.source}: by the time column the supply turns at {supply_hz:.3g} Hz: the time is in {unit}", one.sample_period_s,
-            "seconds", f"name its unit, as `time ({unit[:-len('seconds')]}seconds)`, or give seconds",
-        )  # fmt: skip
-    _check_stamps(one)
-    if per_period < AS_NAMED * LEAST_RATE:
-        least = LEAST_RATE * scales.frequency_rad_per_s / (2 * np.pi)
-        raise _refused(
-            f"{one.source}: {per_period:.0f} samples a period of the supply are too few",
-            1.0 / one.sample_period_s,
-            f"{least:.0f} samples a second",
-            f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
-        )
-    sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
-    if sigma > NOISY_VOLTAGE * scales.voltage_v:
-        raise _refused(
-            f"{one.source}: the voltages are pulses of an inverter, not their means", sigma, NOISY_VOLTAGE * scales.voltage_v,
-            "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages"
-            f"{_for_monitor(one, per_period)}",
-        )  # fmt: skip
-
-
-def _check_lines(one: RunningRecording, voltage: Array, scales: Scales) -> None:
-    if (odd := no_lines(one, scales.current_a, scales.voltage_v)) is not None:
-        raise _refused(
-            f"{one.source}: {odd.what}", f"{odd.share:.2f} of them is left", f"at most {odd.limit:g}", odd.remedy
-        )
-    _check_speed(one, voltage, scales)
-
-
-def _block(one: RunningRecording) -> int:
-    """Rows of a period of the supply, and enough of them where the time column is in another unit."""
-    return max(round(BLOCK_S / one.sample_period_s), LEAST_SAMPLES)
-
-
-def _turn(one: RunningRecording, voltage: Array, scales: Scales) -> tuple[Array, Bools]:
-    """(rad/s by which the voltage turns in blocks of a period, whether it is there in all of a block)."""
-    block = _block(one)
-    whole = one.time_s.size // block * block
-    v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
-    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
-    return turn, (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & (turn > 0.0)
-
-
-def _supply_hz(one: RunningRecording, voltage: Array, scales: Scales) -> float:
-    """Of most of the recording; 0 where the motor is not fed, or by a frequency that moves."""
-    turn, is_fed = _turn(one, voltage, scales)
-    if not is_fed.any():
-        return 0.0
-    least, median, most = np.quantile(turn[is_fed], (0.1, 0.5, 0.9))
-    return float(median) / (2 * np.pi) if most - least < STEADY_TURN * median else 0.0
-
-
-def _check_stamps(one: RunningRecording) -> None:
-    """DataRefused where time stamps wander by half a period: no stretch would be left between them. (Lost rows make steps of whole ones.)"""
-    steps = np.diff(one.time_s) / one.sample_period_s
-    wander = int(np.count_nonzero(~((steps > 0.0) & (steps < 1.5))))
-    if wander > MOST_JUMPS and float(np.median(np.abs(steps - np.round(steps)))) > WANDERS:
-        raise _refused(
-            f"{one.source}: the time stamps wander: {wander} steps are none of one sample period", f"{np.std(steps):.2g} of a period rms",
-            "a stamp within half a period", "record with a hardware clock; if the samples were taken at even steps, leave the time column out and give `# sample_period_s:`",
-        )  # fmt: skip
-
-
-def _check_sizes(windows: Sequence[Window], one: RunningRecording, supply_hz: float, scales: Scales) -> None:
-    """DataRefused where most of what flows, or of the voltage, is of a size that this motor cannot have."""
-    if not windows:
-        return
-    amps, volts = (
-        np.concatenate([np.hypot(*x.T) for x in group])
-        for group in ([w.current[:, :2] for w in windows], [w.voltage[::2] for w in windows])
-    )
-    rated_hz = scales.frequency_rad_per_s / (2 * np.pi)
-    levels = [current_level(float(np.median(amps)) / scales.current_a, LEAST_FED, 1.5 * MOST_LOCKED)]
-    if supply_hz > 0.0:
-        levels.append(
-            voltage_level(float(np.median(volts)) / scales.voltage_v * rated_hz / supply_hz, supply_hz / rated_hz)
-        )
-    for level in levels:
-        if level is not None:
-            raise _refused(
-                f"{one.source}: {level.what}", f"{level.value:.3g} of the plate's", level.limit, level.remedy
-            )
-
-
-def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
-    """Refused where the shaft is told to turn much faster than the field of the voltage: another unit."""
-    if one.speed_rad_per_s is None:
-        return
-    turn, is_fed = _turn(one, voltage, scales)
-    block = _block(one)
-    speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[: turn.size * block].reshape(-1, block)).mean(axis=1)
-    is_fed &= np.isfinite(speed)
-    ratio = float(np.median(speed[is_fed] / turn[is_fed])) if is_fed.any() else 0.0
-    if ratio > MOST_OVER_FIELD:
-        raise _refused(
-            f"{one.source}: the shaft would turn {ratio:.3g} times as fast as the field that the voltage makes", ratio, MOST_OVER_FIELD,
-            "the column is the shaft's speed in rad/s (9.55 times too much: it is in rev/min, which the column speed_rpm takes; as many times as "
-            "the poles have pairs: it is the electrical one)",
-        )  # fmt: skip
-
-
-def _for_monitor(one: RunningRecording, per_period: float) -> str:
-    """What else reads this recording, as the end of a remedy; empty where its rate or length is too little there too."""
-    if per_period < MONITORED_RATE or (one.time_s.size + 1) * one.sample_period_s < MONITORED_S:
-        return ""
-    return "; this recording of a running motor is for `commissioner monitor`: speed, torque and parameters of a steady load"
-
-
 def _swept(voltage: Array) -> Array:
     """Twice the area that the voltage's vector sweeps from each sample to the next, V^2: its sign is the supply's direction."""
     v = voltage[:, 0] + 1j * voltage[:, 1]
@@ -527,42 +387,6 @@ def negative_sequence(voltage: Array) -> float:
 def _turns_against(speed: Array, voltage: Array) -> bool:
     """Whether the shaft turns mostly in the direction opposite to the supply's, as a sensor of the other sign shows it."""
     return bool(np.nansum(_swept(voltage) * speed[1:]) < 0)
-
-
-def _is_crossed(current: Array, voltage: Array, scales: Scales) -> bool:
-    """Whether most of the current turns against the voltage, less what the voltage's own weaker part drives: at that part the motor is as
-    good as locked, so that an idle one's current turns backwards from a few per cent of it on."""
-    v, i = (np.nan_to_num(x[:, 0] + 1j * x[:, 1]) for x in (voltage, current))
-    turn = abs(float(np.angle(np.sum(np.conj(v[:-1]) * v[1:]))))
-    quarter = min(max(round(0.5 * np.pi / max(turn, 1e-9)), 1), v.size // 2)
-    (forward, backward), parts = _turning(v, quarter), _turning(i, quarter)
-    along, against = np.where(forward > backward, parts, parts[::-1]) * (
-        forward + backward > OFF_VOLTAGE * scales.voltage_v
-    )
-    driven = MOST_LOCKED * scales.current_a / scales.voltage_v * np.minimum(forward, backward)
-    return bool(np.sum(np.maximum(against - driven, 0.0) ** 2) > np.sum(along**2))
-
-
-def _check_order(windows: Sequence[Window], source: str) -> None:
-    """DataRefused where the currents lag by what no motor's do: in a start they take power, in any state they magnetize."""
-    from_rest = [w for w in windows if w.is_from_rest]
-    parts = [(w.voltage[::2] @ [1, 1j], w.current[:, :2] @ [1, 1j]) for w in from_rest or windows]
-    lag = float(np.degrees(np.angle(sum(complex(np.sum(v * np.conj(i))) for v, i in parts)))) * (
-        windows[0].direction if windows else 1.0
-    )
-    least, most = LAG_DEG if from_rest else (LAG_DEG[0], 180.0 + LAG_DEG[0])
-    if not parts or least < lag < most or lag < most - 360.0:
-        return
-    others = [said for said, by in READ_AS if LAG_DEG[0] < (lag + by + 180.0) % 360.0 - 180.0 < LAG_DEG[1]]
-    raise _refused(
-        f"{source}: the currents lag their voltages by {lag:.0f} degrees, which no motor's do: channels are in another order or turned round",
-        f"{lag:.0f} degrees", f"{least:g} ... {most:g}", f"check sign and order of the current channels (a motor's lag has the currents {' or '.join(others)})",
-    )  # fmt: skip
-
-
-def _turning(x: NDArray[np.complex128], quarter: int) -> Array:
-    """(2, n): sizes of a vector's parts that turn forward and backward, from what it is a quarter of a period later."""
-    return 0.5 * np.abs(x[:-quarter] + np.outer([-1j, 1j], x[quarter:]))
 
 
 def _open_phases(one: RunningRecording, current: Array, scales: Scales) -> Bools:

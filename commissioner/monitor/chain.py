@@ -18,6 +18,8 @@ from commissioner.monitor.intake.against_plate import (
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.channels import Wiring
 from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.intake.levels import late_currents
+from commissioner.monitor.intake.sensors import SKEW_STD_S
 from commissioner.monitor.intake.terminals import lost_in_loop_w
 from commissioner.monitor.loads.mean_speed import whole_record_speed
 from commissioner.monitor.loads.mean_torque import whole_record_torque
@@ -98,13 +100,14 @@ class Refused:
 @dataclass(frozen=True)
 class Wishes:
     """What the caller knows: load frequencies in Hz, the inertia, a better start than the plate; `trust`: plate | data, which is
-    right where the two contradict each other; `wired`: how the current channels are, where a start shows it."""
+    right where the two contradict each other; `wired`: how the current channels are, `skew_std_s`: how well their delay against the voltages is known, where a start shows it."""
 
     load_frequencies_hz: tuple[float, ...] = ()
     inertia_kg_m2: float | None = None
     start: Start | None = None
     trust: str | None = None
     wired: Wiring | None = None
+    skew_std_s: float = SKEW_STD_S
 
 
 def observe(
@@ -116,7 +119,7 @@ def observe(
     """
     wishes = wishes or Wishes()
     start = wishes.start or Start(from_nameplate(plate), fitting.PRIOR_FROM_NAMEPLATE, "nameplate")
-    audited = inspect(recording, plate, start.circuit, lag_deg, wishes.wired)
+    audited = inspect(recording, plate, start.circuit, lag_deg, wishes.wired, wishes.skew_std_s)
     if audited.refusal or audited.supply is None or audited.fundamental is None:
         reason = audited.refusal or Finding("unknown", "refused", "the audit did not finish")
         return Refused(audited, reason, audited.findings)
@@ -232,7 +235,12 @@ def _invert(
         torque_std,
         sensor_std,
         proof,
-        (*audited.findings, frequency_wander(frame, part), *bar_or_load(bands)),
+        (
+            *audited.findings,
+            *late_currents(fitted.delay_s, fitted.delay_std_s),
+            frequency_wander(frame, part),
+            *bar_or_load(bands),
+        ),
         inertia,
         bands,
     )

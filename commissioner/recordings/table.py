@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.monitor.intake.columns import from_one_current
-from commissioner.motor.channels.faults import put_on_time, put_right
+from commissioner.motor.channels.faults import put_right, put_right_at_rest
 from commissioner.motor.computed import COMPUTED, printed_step, without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, too_large
@@ -250,7 +250,7 @@ def to_standstill(table: Table) -> StandstillRecording:
         notes=table.notes,
         averaged=_averaged(table, segment),
     )
-    return put_on_time(without_computed_third(recording))
+    return put_right_at_rest(without_computed_third(recording))
 
 
 def _without_unmeasured(table: Table, columns: Mapping[str, Signal], every: int, notes: Sequence[ReadingNote]) -> Table:

@@ -16,7 +16,8 @@ from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DiagnosisVerdict, RunningRecording
 from commissioner.running.at_flux import at_flux, is_saturated, stator_flux_wb
-from commissioner.running.causes import CATALOGUE, tied_in
+from commissioner.running.causes import CATALOGUE, goes_by, tied_in
+from commissioner.running.causes.cause import Cause
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.residual.lack import Lack, lack_of_fit, not_told, of_shaft, rms_errors
 from commissioner.running.rules import RULES
@@ -215,13 +216,14 @@ def _cause(found: Found, one: Named) -> NamedCause:
     gain, rivals = found.gain[one.cause], found.rivals[one.cause]
     close = max(RULES.tie * found.fit.scale, RULES.tie_share * gain)
     tied = [name for name, lost in rivals.items() if lost < close]
-    known = (*tied_in(one.cause, found.problem.record), *_of_own_unbalance(found, one))
+    name, *same = goes_by(one.cause, found.problem.record, found.fit.machine.values())
+    known = (*tied_in(name, found.problem.record), *_of_own_unbalance(found, one), *same)
     equivalent = tuple(dict.fromkeys((*known, *tied)))
     nearest = min((lost for name, lost in rivals.items() if name not in equivalent), default=gain)
     sure = MOST_SURE * (1.0 - np.exp(-0.5 * min(nearest, gain) / (found.fit.scale * 5.0)))
     total = max(found.nominal.chi2 - found.fit.chi2, 1e-9)
     return NamedCause(
-        one.cause, one.form.name, _sizes(found, one), float(min(gain / total, 1.0)), gain, float(np.sqrt(gain / found.fit.count)),
+        name, one.form.name, _sizes(found, one, CATALOGUE[name]), float(min(gain / total, 1.0)), gain, float(np.sqrt(gain / found.fit.count)),
         float(sure), equivalent, rivals,
     )  # fmt: skip
 
@@ -242,9 +244,9 @@ def _of_own_unbalance(found: Found, one: Named) -> tuple[str, ...]:
     return tuple(c.name for c in CATALOGUE.values() if c.negative_sequence == "impedes" and c.name not in accepted)
 
 
-def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
+def _sizes(found: Found, one: Named, cause: Cause) -> dict[str, tuple[float, float, str]]:
     """With standard deviations from the covariance of all that was free."""
-    scales, cause = found.problem.record.scales, CATALOGUE[one.cause]
+    scales = found.problem.record.scales
     units = {name: unit for name, (_, unit) in cause.sizes(found.fit.machine.values(), scales).items()}
     told = _with_errors(
         found.fit, lambda values: {name: size for name, (size, _) in cause.sizes(values, scales).items()}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.checks import BLOCK_S
 from commissioner.estimation.fit import (
     INERTIA,
     Column,
@@ -30,8 +31,9 @@ from commissioner.estimation.hidden import by_laws, drawn_aside, told_in, with_t
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import BLOCK_S, STATES, Record, first_part, prepare
+from commissioner.estimation.record import STATES, Record, first_part, prepare, scales_of
 from commissioner.identify.contract import Measured, RunningDocument
+from commissioner.motor.channels.faults import currents_on_time
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -76,7 +78,7 @@ class Identified:
 
 def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identified:
     """DataRefused where the recordings cannot carry four parameters."""
-    record = prepare(recordings, plate)
+    record = _prepared(recordings, plate)
     if not record.has_speed and record.has_start:
         record = _until_first_step(record)
     problem = problem_of(record, 0.0)
@@ -118,6 +120,19 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
         _parameters(four, covariance), bound, covariance, inertia, load, to_t_model(four, absolute), left,
         fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, late, inertia, fit),
     )  # fmt: skip
+
+
+def _prepared(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
+    """Windows of the recordings, their currents shifted by the whole rows that a start shows them to be late: what is left the fit finds."""
+    peak = scales_of(plate).voltage_v
+    on_time = [currents_on_time(one, peak, by_whole_rows=True)[0] for one in recordings]
+    record = prepare(on_time, plate)
+    said = (
+        f"{one.source}: {one.notes[-1].what}."
+        for one, raw in zip(on_time, recordings, strict=True)
+        if len(one.notes) > len(raw.notes)
+    )
+    return replace(record, remarks=(*said, *record.remarks))
 
 
 def _until_first_step(record: Record) -> Record:

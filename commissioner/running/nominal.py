@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
+from commissioner.estimation.checks import BLOCK_S
 from commissioner.estimation.fit import (
     CALM_S,
     INERTIA,
@@ -25,7 +26,7 @@ from commissioner.estimation.fit import (
 from commissioner.estimation.held import best_reading
 from commissioner.estimation.noisy_input import with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import BLOCK_S, STATES, Record
+from commissioner.estimation.record import STATES, Record
 from commissioner.estimation.told import Slopes
 from commissioner.motor.nameplate import prior
 from commissioner.running.residual.ripple_lines import slips_of

@@ -7,6 +7,8 @@ import math
 import numpy as np
 
 from commissioner.identify.intake.stretches import Stretch, refused
+from commissioner.motor.channels.ends import piled_up
+from commissioner.motor.channels.sums import LARGEST_SUM_AT_REST, left_in_step
 from commissioner.records import Signal, StandstillRecording
 
 LARGEST_CROSS_CURRENT, NOTED_CROSS_CURRENT = 0.12, 0.04
@@ -17,8 +19,6 @@ NO_MORE_THAN_NOISE, LEAST_ROWS = 1.5, 500
 LINE, STANDS_OUT = 0.2, 10.0
 """Of the largest line of the voltage: what is a line; and the mean power of the current there over that of all frequencies, from where on it is
 driven. Noise alone makes 2 with the one or two bins of one tone at the most."""
-LARGEST_SUM = 0.06
-"""Of the current, what the three phases may add up to in step with one of them: sensors differ by a few per cent."""
 LARGEST_ROTATION = 0.7
 LEAST_POWER_FACTOR = 0.01
 SLOW_ROWS = 64
@@ -123,7 +123,7 @@ def require_unclipped(recording: StandstillRecording) -> None:
         if values is None:
             continue
         for sign in (1.0, -1.0):
-            piled = _piled_up(sign * values[moving])
+            piled = piled_up(sign * values[moving])
             if piled is not None:
                 raise refused(
                     f"{name} is clipped",
@@ -137,31 +137,11 @@ def require_balanced(recording: StandstillRecording) -> None:
     """A star point carries no current: where the three phases do not cancel, one channel is limited or wrongly scaled."""
     if recording.current_w_a is None:
         return
-    phases = [i - np.mean(i) for i in (recording.current_u_a, recording.current_v_a, recording.current_w_a)]
-    total = phases[0] + phases[1] + phases[2]
-    largest = max(float(np.mean(i * i)) for i in phases)
-    noise = [float(np.var(np.diff(i, 2))) / 6.0 for i in phases]
-    shares = [
-        max(abs(float(np.mean(total * i))) - n, 0.0) / max(largest, 1e-300) for i, n in zip(phases, noise, strict=True)
-    ]
-    if max(shares) > LARGEST_SUM:
+    share, phase = left_in_step((recording.current_u_a, recording.current_v_a, recording.current_w_a))
+    if share > LARGEST_SUM_AT_REST:
         raise refused(
             "the phase currents do not add up to zero",
-            f"{max(shares):.0%} of the current is left, in step with phase {'uvw'[int(np.argmax(shares))]}",
-            f"at most {LARGEST_SUM:.0%}",
+            f"{share:.0%} of the current is left, in step with phase {'uvw'[phase]}",
+            f"at most {LARGEST_SUM_AT_REST:.0%}",
             "look for a clipped or wrongly scaled current channel; two sound phases are enough, leave the third out",
         )
-
-
-def _piled_up(values: Signal) -> int | None:
-    """How many samples sit at the largest value, if more than its neighbourhood makes plausible."""
-    if values.size < 100:
-        return None
-    top = float(np.max(values))
-    if top <= 0.0:
-        return None
-    levels = np.unique(values)
-    quantum = float(np.min(np.diff(levels))) if levels.size > 1 else top
-    at_top = int(np.sum(values >= top - 0.01 * quantum - 1e-9 * top))
-    near = int(np.sum(values >= top - max(0.05 * top, 10.0 * quantum)))
-    return at_top if at_top >= 8 and at_top > 0.45 * near and near < values.size // 2 else None

@@ -12,7 +12,7 @@ import numpy as np
 
 from commissioner.monitor.intake import channels, clock, columns, levels
 from commissioner.monitor.intake.findings import Audited, Finding, Findings, Fundamental
-from commissioner.monitor.intake.sensors import evened, trust_of
+from commissioner.monitor.intake.sensors import SKEW_STD_S, evened, trust_of
 from commissioner.monitor.signals.supply import (
     SupplyAngle,
     Vector,
@@ -37,10 +37,12 @@ def inspect(
     start: TCircuit,
     lag_deg: float | None = None,
     wired: channels.Wiring | None = None,
+    skew_std_s: float = SKEW_STD_S,
 ) -> Audited:
     """Everything that can be said about the recording before any verdict; never raises on bad data.
 
-    `lag_deg`: the order of the channels is known to be that of this lag of the currents; `wired`: it is known as such.
+    `lag_deg`: the order of the channels is known to be that of this lag of the currents; `wired`: it is known as such; `skew_std_s`: standard
+    deviation of their delay against the voltages.
     """
     findings = Findings(Finding(note.code, "note", note.what) for note in recording.notes)
     recording, exchanged = columns.sort_by_kind(recording, plate)
@@ -100,7 +102,7 @@ def inspect(
         fundamental,
         tuple(findings),
         pairing.channel_map,
-        trust_of(even_i, even_v, supply),
+        trust_of(even_i, even_v, supply, skew_std_s),
         pairing.lag_deg,
         pairing.rivals_deg,
         pairing.others_deg,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.monitor.intake.findings import Findings, Fundamental
+from commissioner.monitor.intake.findings import Finding, Findings, Fundamental
+from commissioner.monitor.intake.sensors import SKEW_STD_S
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.channels.clock import off_mains
 from commissioner.motor.channels.ends import clipped
@@ -16,6 +17,8 @@ from commissioner.records import Signal
 LARGEST_CLIPPED = 0.002
 """Share of samples that sit on the same extreme value beyond what a sine would put there."""
 NOTED_GAIN = 0.01
+SURE_DELAY = 4.0
+"""Standard deviations from which a delay that was fitted is said."""
 LARGEST_RIPPLE = 0.35
 """Share of the voltage's rms that is not its fundamental: beyond it the voltage is a switched one, sampled without filter."""
 
@@ -120,3 +123,16 @@ def of_mains(fundamental: Fundamental, findings: Findings) -> None:
             "50 or 60 Hz",
             "check sample_period_s and the time column",
         )
+
+
+def late_currents(delay_s: float, std_s: float) -> tuple[Finding, ...]:
+    """A finding where the fit put the currents right by more than sensors are usually apart."""
+    if not abs(delay_s) > max(SKEW_STD_S, SURE_DELAY * std_s):
+        return ()
+    way = "behind" if delay_s > 0.0 else "before"
+    return (
+        Finding(
+            "late_channel", "corrected", f"all currents are {abs(delay_s) * 1e6:.3g} us {way} the voltages (+- {2e6 * std_s:.2g} us): put right",
+            delay_s, SKEW_STD_S, "use one converter for all channels, or correct the currents' time",
+        ),
+    )  # fmt: skip

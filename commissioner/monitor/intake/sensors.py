@@ -73,12 +73,12 @@ def evened(group: Sequence[Signal], sums_to_zero: bool, supply: SupplyAngle, per
     return Evened(signals, gain - 1, STAYS_UNLIKE * share)
 
 
-def trust_of(currents: Evened, voltages: Evened, supply: SupplyAngle) -> Trust:
-    """From how unlike the sensors of the two groups are, and what is taken where nothing is known."""
+def trust_of(currents: Evened, voltages: Evened, supply: SupplyAngle, skew_std_s: float = SKEW_STD_S) -> Trust:
+    """From how unlike the sensors of the two groups are, and what is taken where nothing is known (`skew_std_s`: of the delay)."""
     unlike = float(min(np.sqrt(LEAST_ASYMMETRY**2 + currents.unlike**2 + voltages.unlike**2), LARGEST_ASYMMETRY))
     seen = float(np.sqrt((np.var(currents.difference) + np.var(voltages.difference)) / 3))
     return Trust(
         float(np.hypot(GAIN_STD, np.hypot(unlike, seen))),
-        float(np.hypot(SKEW_STD_S, unlike / supply.carrier_rad_per_s)),
+        float(np.hypot(skew_std_s, unlike / supply.carrier_rad_per_s)),
         unlike,
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.monitor.intake.findings import Audited, Fundamental
+from commissioner.monitor.intake.sensors import SKEW_STD_S
 from commissioner.monitor.signals.quiet import wander
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
@@ -40,6 +41,11 @@ def power_wander_w(audited: Audited) -> float:
     return wander(power, max(round(level_s / audited.sample_period_s), 1))
 
 
+def late_w(seen: Fundamental, late_s: float) -> float:
+    """What currents that are `late_s` behind their voltages make of the reactive power."""
+    return abs(seen.reactive_var) * 2.0 * math.pi * seen.frequency_hz * late_s
+
+
 def lost_in_loop_w(seen: Fundamental, plate: Nameplate) -> float:
     """What a shorted loop may take of the power, none of which is torque: it draws as much current of positive sequence as of negative, and no
     more of that than the voltages' own unbalance does not drive."""
@@ -48,9 +54,12 @@ def lost_in_loop_w(seen: Fundamental, plate: Nameplate) -> float:
     return 1.5 * abs(seen.voltage_v) * max(abs(seen.current_negative_a) - driven, 0.0)
 
 
-def from_terminals(seen: Fundamental | None, plate: Nameplate, wander_w: float = 0.0) -> Terminals | None:
+def from_terminals(
+    seen: Fundamental | None, plate: Nameplate, wander_w: float = 0.0, skew_std_s: float = SKEW_STD_S
+) -> Terminals | None:
     """T = (P - 3 R_s I^2) / (omega / p), and the slip that this torque has by the plate; None where no machine draws so. `wander_w`:
-    rms of the power's movement within the stretch, which no mean tells."""
+    rms of the power's movement within the stretch, which no mean tells; `skew_std_s`: standard deviation of the currents' delay against the voltages,
+    which takes reactive power for active."""
     if seen is None:
         return None
     apparent = math.hypot(seen.power_w, seen.reactive_var)
@@ -62,7 +71,8 @@ def from_terminals(seen: Fundamental | None, plate: Nameplate, wander_w: float =
     volts = math.sqrt(1.5) * abs(seen.voltage_v)
     rated_apparent = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a
     of_iron = IRON_STD * max(apparent, rated_apparent * (volts / plate.rated_voltage_v) ** 2)
-    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron, lost_in_loop_w(seen, plate), wander_w) / synchronous
+    late = late_w(seen, skew_std_s)
+    torque_std = math.hypot(RESISTANCE_STD * copper, of_iron, lost_in_loop_w(seen, plate), wander_w, late) / synchronous
     rated_nm = plate.rated_power_w / (plate.rated_speed_rpm * math.pi / 30.0)
     flux, rated_flux = volts / seen.frequency_hz, plate.rated_voltage_v / plate.rated_frequency_hz
     drop = plate.rated_slip * 2.0 * math.pi * plate.rated_frequency_hz / plate.pole_pairs * torque / rated_nm

@@ -41,6 +41,21 @@ def clipped(x: Signal) -> tuple[NDArray[np.bool_], float]:
     return rows, share
 
 
+def piled_up(values: Signal) -> int | None:
+    """How many samples of a channel at standstill sit at its largest value, if more than its neighbourhood makes plausible: there levels stand, so that
+    only rows in which the voltage moves are asked."""
+    if values.size < 100:
+        return None
+    top = float(np.max(values))
+    if top <= 0.0:
+        return None
+    levels = np.unique(values)
+    quantum = float(np.min(np.diff(levels))) if levels.size > 1 else top
+    at_top = int(np.sum(values >= top - 0.01 * quantum - 1e-9 * top))
+    near = int(np.sum(values >= top - max(0.05 * top, 10.0 * quantum)))
+    return at_top if at_top >= 8 and at_top > 0.45 * near and near < values.size // 2 else None
+
+
 def runs_into(x: Signal, rows: NDArray[np.bool_]) -> bool:
     """Whether the channel comes to these values as steeply as it moved before, as one that is cut off does; a step of a voltage jumps there."""
     first = np.flatnonzero(rows[2:] & ~rows[1:-1] & ~rows[:-2]) + 2

@@ -9,51 +9,123 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
+from commissioner.motor.channels.closing import TURNS, Behind, currents_behind
+from commissioner.motor.channels.drift import DRIVES, drifts_of, supply_hz
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
 from commissioner.motor.channels.late import Late, late, shifted
 from commissioner.motor.channels.rows import held, lost, written_twice
 from commissioner.motor.channels.spikes import without_spikes
+from commissioner.motor.channels.stamps import with_even_time
 from commissioner.motor.channels.sums import OpenSum, open_sum
 from commissioner.records import ReadingNote, RunningRecording, Signal, StandstillRecording
 
 PHASES, LINES = ("u", "v", "w"), ("uv", "vw", "wu")
 SPIKES, WRAPPED, LATE, POLARITY = "spikes", "wrapped", "late_channel", "polarity"
-HELD, LOST = "held_rows", "lost_rows"
+HELD, LOST, DRIFT = "held_rows", "lost_rows", "drifting_offset"
 Group = tuple[Signal, Signal, Signal]
 
 
 def put_right(one: RunningRecording) -> RunningRecording:
-    """The recording without wraps, spikes, a turned sign and delays between its channels, with a note of each."""
+    """The recording without wraps, spikes, a turned sign, drifting offsets and delays between its channels, with a note of each."""
+    one = with_even_time(one, TURNS @ np.array(one.voltages_v)) if one.sample_period_s > 0.0 else one
     one = _without_held(one)
     _require_once(one)
     one = _with_losses(one)
-    groups: list[Group] = [one.currents_a, one.voltages_v]
-    named = list(zip(("current", "voltage"), (PHASES, names_of_voltages(one)), strict=True))
-    notes, spikes, beyond = list(one.notes), 0, np.zeros(one.time_s.size, dtype=bool)
-    for g, (kind, names) in enumerate(named):
-        channels = list(groups[g])
-        for k, name in enumerate(names):
-            channels[k], span, many = unwrapped(channels[k])
-            if many:
-                what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {'AV'[g]} away): put back"
-                notes.append(ReadingNote(WRAPPED, what))
-            channels[k], count = without_spikes(channels[k])
-            spikes += count
-        if (odd := _turned(channels, kind, names)) is not None:
-            channels[odd] = -channels[odd]
-            what = f"{kind} {names[odd]} is minus what the other two leave for it: its sign was turned (or that of both others)"
-            notes.append(ReadingNote(POLARITY, what))
+    return _with_channels_on_time(_without_drifts(_with_channels_whole(one)))
+
+
+def _with_channels_whole(one: RunningRecording) -> RunningRecording:
+    """The recording with what ran over put back, without spikes, and with a turned channel's sign."""
+    groups: list[Group] = []
+    notes, spikes = list(one.notes), 0
+    for kind, unit, names, group in _groups(one):
+        channels, own, count = _whole(group, kind, unit, names)
+        groups.append((channels[0], channels[1], channels[2]))
+        notes, spikes = notes + own, spikes + count
+    return replace(one, currents_a=groups[0], voltages_v=groups[1], notes=(*notes, *_of_spikes(spikes)))
+
+
+def _whole(
+    group: Sequence[Signal], kind: str, unit: str, names: Sequence[str], cuts: Sequence[int] = ()
+) -> tuple[list[Signal], list[ReadingNote], int]:
+    """(channels with what ran over put back, without spikes, and of three with a turned one's sign; notes; how many spikes). `cuts`: first rows behind a pause."""
+    channels, notes, spikes = list(group), [], 0
+    for k, name in enumerate(names):
+        parts = [unwrapped(part) for part in np.split(channels[k], cuts)]
+        span, many = max(p[1] for p in parts), sum(p[2] for p in parts)
+        channels[k] = np.concatenate([p[0] for p in parts]) if many else channels[k]
+        if many:
+            what = f"{many} samples of {kind} {name} ran over the end of its range and began again at the other ({span:.4g} {unit} away): put back"
+            notes.append(ReadingNote(WRAPPED, what))
+        channels[k], count = without_spikes(channels[k])
+        spikes += count
+    if len(channels) == len(PHASES) and (odd := _turned(channels, kind, names)) is not None:
+        channels[odd] = -channels[odd]
+        what = f"{kind} {names[odd]} is minus what the other two leave for it: its sign was turned (or that of both others)"
+        notes.append(ReadingNote(POLARITY, what))
+    return channels, notes, spikes
+
+
+def _of_spikes(count: int) -> tuple[ReadingNote, ...]:
+    if not count:
+        return ()
+    what = f"{count} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
+    return (ReadingNote(SPIKES, what),)
+
+
+def _without_drifts(one: RunningRecording) -> RunningRecording:
+    """The recording without what its channels' offsets drift by."""
+    hz = supply_hz(TURNS @ np.nan_to_num(one.voltages_v), one.sample_period_s) if one.sample_period_s > 0.0 else 0.0
+    if not hz > 0.0:
+        return one
+    notes, groups = list(one.notes), []
+    seen = [drifts_of(group, one.time_s, hz) for group in (one.currents_a, one.voltages_v)]
+    flows = max((d.share for d in seen[0] if d), default=0.0)
+    for (kind, unit, names, group), drifts in zip(_groups(one), seen, strict=True):
+        channels = list(group)
+        for k, (name, drift) in enumerate(zip(names, drifts, strict=True)):
+            if drift is not None and (kind == "current" or flows < DRIVES * drift.share):
+                channels[k] = channels[k] - drift.curve
+                notes.append(ReadingNote(DRIFT, f"{drift.said(kind, name, unit)}: taken off"))
+        groups.append((channels[0], channels[1], channels[2]))
+    return replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
+
+
+def _with_channels_on_time(one: RunningRecording) -> RunningRecording:
+    """The recording with the channels of a group that were taken one after another shifted back."""
+    groups: list[Group] = []
+    notes, beyond = list(one.notes), np.zeros(one.time_s.size, dtype=bool)
+    for kind, _, names, group in _groups(one):
+        channels = list(group)
         if seen := late(channels, one.sample_period_s):
             gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
             channels = _shifted_back(channels, seen, gaps, one.sample_period_s)
             notes.append(ReadingNote(LATE, f"{seen.said(kind, names)}: shifted back"))
-            beyond |= ~np.isfinite(channels).all(axis=0) & np.isfinite(groups[g]).all(axis=0)
-        groups[g] = (channels[0], channels[1], channels[2])
-    if spikes:
-        what = f"{spikes} samples stand out of their neighbours alone (spikes): taken as the neighbours tell them"
-        notes.append(ReadingNote(SPIKES, what))
+            beyond |= ~np.isfinite(channels).all(axis=0) & np.isfinite(group).all(axis=0)
+        groups.append((channels[0], channels[1], channels[2]))
     mended = replace(one, currents_a=groups[0], voltages_v=groups[1], notes=tuple(notes))
     return _without_ends(mended, beyond)
+
+
+def _groups(one: RunningRecording) -> tuple[tuple[str, str, tuple[str, str, str], Group], ...]:
+    """(kind, unit, names, channels) of currents and voltages."""
+    return ("current", "A", PHASES, one.currents_a), ("voltage", "V", names_of_voltages(one), one.voltages_v)
+
+
+def put_right_at_rest(one: StandstillRecording) -> StandstillRecording:
+    """A recording at standstill without wraps, spikes, a turned sign and delays between its currents, with a note of each. Of rows that are means
+    over several periods it is not asked."""
+    if one.averaged is not None:
+        return one
+    group = [one.current_u_a, one.current_v_a, *([] if one.current_w_a is None else [one.current_w_a])]
+    (u, v, *rest), notes, spikes = _whole(
+        group, "current", "A", PHASES[: len(group)], (np.flatnonzero(np.diff(one.segment)) + 1).tolist()
+    )
+    notes += _of_spikes(spikes)
+    if notes:
+        w = rest[0] if rest else None
+        one = replace(one, current_u_a=u, current_v_a=v, current_w_a=w, notes=(*one.notes, *notes))
+    return put_on_time(one)
 
 
 def put_on_time(one: StandstillRecording) -> StandstillRecording:
@@ -80,6 +152,26 @@ def put_on_time(one: StandstillRecording) -> StandstillRecording:
         one, time_s=one.time_s[~ends], segment=one.segment[~ends], axis_deg=one.axis_deg[~ends], voltage_axis_v=one.voltage_axis_v[~ends],
         current_u_a=u, current_v_a=v, current_w_a=w, dc_link_v=None if one.dc_link_v is None else one.dc_link_v[~ends], notes=(*one.notes, note),
     )  # fmt: skip
+
+
+def currents_on_time(
+    one: RunningRecording, rated_voltage_peak_v: float, *, by_whole_rows: bool = False
+) -> tuple[RunningRecording, Behind | None]:
+    """The recording with its currents shifted by what a closing shows them to be behind the voltages, a note of it, and what was seen;
+    `by_whole_rows`: to the nearest row, of which no noise is changed and a fit takes the rest."""
+    seen = currents_behind(one, rated_voltage_peak_v)
+    if seen is None or not seen.is_told:
+        return one, seen
+    rows = seen.late_s / one.sample_period_s
+    rows = round(rows) if by_whole_rows else rows
+    if rows == 0.0:
+        return one, seen
+    gaps = np.flatnonzero(~(np.diff(one.time_s) < 1.5 * one.sample_period_s)) + 1
+    u, v, w = (np.concatenate([shifted(p, rows) for p in np.split(x, gaps)]) for x in one.currents_a)
+    ends = [~np.isfinite(x) & np.isfinite(before) for x, before in zip((u, v, w), one.currents_a, strict=True)]
+    what = f"{seen.words}: shifted back{' by whole rows' if by_whole_rows else ''}"
+    mended = replace(one, currents_a=(u, v, w), notes=(*one.notes, ReadingNote(LATE, what)))
+    return _without_ends(mended, np.any(ends, axis=0)), seen
 
 
 def without_clipped(one: RunningRecording) -> tuple[RunningRecording, list[str]]:

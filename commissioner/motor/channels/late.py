@@ -35,6 +35,10 @@ ALONE, WHOLE = 0.2, 0.05
 to be one."""
 JUMPS, MOSTLY_USUAL = 10.0, 0.98
 """Of what is left in the median, from which a block holds a jump; of the blocks, the part that do not, or what is left is another kind of fault."""
+FADES, REPLY, PARTS = 10.0, 400, 8
+"""Time constants of a low pass that its beginning takes; samples of its reply to one; parts of a recording that are left out in turn."""
+CLEAR, TOLD_TO, UNDECIDED = 1.5, 0.15, 0.2
+"""Over the noise, the power of what a low pass and a delay differ by; how well the share of it in a channel must be known, and how far from a half."""
 PASSES = 6
 LEAST_BLOCKS = 100
 APART = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
@@ -47,20 +51,26 @@ SMOOTH = np.linalg.pinv(np.vander(TAPS, DEGREE + 1, increasing=True))
 @dataclass(frozen=True)
 class Late:
     """`late_s[k]`: by how much channel k is behind the first, or behind the two that agree (below zero: before them); its largest
-    standard deviation."""
+    standard deviation. `is_filtered`: one passes a low pass of that time constant, or is a delay; None where nothing tells."""
 
     late_s: tuple[float, float, float]
     std_s: float
+    is_filtered: bool | None = None
 
     def said(self, kind: str, names: Sequence[str]) -> str:
         """`current w is 200 us behind the others`."""
+        error = f"+- {2e6 * self.std_s:.2g} us"
+        if self.is_filtered:
+            k = int(np.argmax(self.late_s))
+            return f"{kind} {names[k]} passes a low pass of {self.late_s[k] * 1e6:.4g} us ({error}), what is fast in it stays smaller"
         off = [
             f"{kind} {n} is {abs(s) * 1e6:.4g} us {'behind' if s > 0.0 else 'before'}"
             for n, s in zip(names, self.late_s, strict=True)
             if s != 0.0
         ]
         whom = "the two others" if len(off) == 1 else f"{kind} {names[self.late_s.index(0.0)]}"
-        return f"{' and '.join(off)} {whom} (+- {2e6 * self.std_s:.2g} us; taken one after another, or through a filter of its own)"
+        why = "taken one after another" + ("" if self.is_filtered is False else ", or a low pass")
+        return f"{' and '.join(off)} {whom} ({error}; {why})"
 
 
 def late(group: Sequence[Signal], period_s: float) -> Late | None:
@@ -85,7 +95,52 @@ def late(group: Sequence[Signal], period_s: float) -> Late | None:
     if np.ptp(told) < max(LEAST_S, SURE * std):
         return None
     u, v, w = (_whole(s, std, period_s) for s in told)
-    return Late((u, v, w), std)
+    return Late((u, v, w), std, _is_filtered(group, (u, v, w), period_s))
+
+
+def _is_filtered(group: Sequence[Signal], late_s: tuple[float, float, float], period_s: float) -> bool | None:
+    """Whether the one late channel is what a low pass of first order makes of the two others' sum, or what a delay does: of the difference of these two
+    it holds all or nothing. None where noise makes most of that difference."""
+    k, late = int(np.argmax(late_s)), max(late_s)
+    if sorted(late_s)[:2] != [0.0, 0.0] or not late > 0.0:
+        return None
+    x = np.array(group)
+    there = np.isfinite(x).all(axis=0)
+    others = np.where(there, x[k] - x.sum(axis=0), 0.0)
+    delayed, passed = shifted(others, -late / period_s), _low_pass(others, late, period_s)
+    there &= np.isfinite(delayed)
+    there[: round(FADES * late / period_s)] = False
+    beside = np.stack([np.ones(int(there.sum())), delayed[there], x[(k + 1) % 3][there]], axis=1)
+    apart, left = (
+        z - beside @ np.linalg.lstsq(beside, z, rcond=None)[0]
+        for z in ((passed - delayed)[there], (x[k] - delayed)[there])
+    )
+    pulse = np.zeros(REPLY)
+    pulse[REPLY // 2] = 1.0
+    late_pulse = np.nan_to_num(shifted(pulse, -late / period_s))
+    reply = _low_pass(pulse, late, period_s) - late_pulse
+    noise = (float(np.median(np.abs(np.diff(others, 6)))) / 0.6745) ** 2 / 924.0
+    of_noise, shared = noise * float(reply @ reply), -noise * float(reply @ late_pulse)
+    if float(apart.var()) < CLEAR * of_noise:
+        return None
+    products, squares = (
+        np.array([part.sum() for part in np.array_split(z, PARTS)])
+        for z in (apart * left - shared, apart**2 - of_noise)
+    )
+    without = (products.sum() - products) / (squares.sum() - squares)
+    share, std = float(products.sum() / squares.sum()), float(np.sqrt((PARTS - 1) * without.var()))
+    if not std < TOLD_TO or 0.5 - UNDECIDED < share < 0.5 + UNDECIDED:
+        return None
+    return share > 0.5
+
+
+def _low_pass(x: Signal, time_s: float, period_s: float) -> Signal:
+    """First order, of a signal that is straight from sample to sample."""
+    from scipy.signal import lfilter
+
+    a = float(np.exp(-period_s / time_s))
+    slope = time_s / period_s * (1.0 - a)
+    return np.asarray(lfilter([1.0 - slope, slope - a], [1.0, -a], x))
 
 
 def _fitted(x: Array, size: int, step_s: float, *, is_first: bool) -> tuple[Array, float] | None:

@@ -10,6 +10,8 @@ from commissioner.records import Signal
 SPIKE, SPIKE_SIGMA, SHAPE = 0.1, 20.0, 0.12
 """Of the channel's usual size, and of what its samples usually differ from the cubic through their neighbours, by which a spike does; by how much
 of it the neighbours may differ from what a single one makes of them: at a corner, where a contactor closes, a sixth."""
+STEPS = 4.0
+"""Of the converter, by which a spike stands out at least: a channel without current shows one now and then."""
 MOSTLY = 0.75
 """Quantile of what is compared: neither spikes nor a pause before the start count."""
 MOST_SPIKES = 0.005
@@ -32,6 +34,12 @@ def without_spikes(x: Signal) -> tuple[Signal, int]:
     return out, int(at.size)
 
 
+def _step(x: Signal) -> float:
+    """Of a converter: the least by which values differ."""
+    gaps = np.diff(np.unique(x[np.isfinite(x)]))
+    return float(gaps.min(initial=np.inf)) if gaps.size else 0.0
+
+
 def _spikes(x: Signal, off: Signal) -> NDArray[np.int64]:
     """Where one sample alone is `off` its neighbours."""
     if not np.isfinite(x).any():
@@ -40,5 +48,7 @@ def _spikes(x: Signal, off: Signal) -> NDArray[np.int64]:
     least = max(SPIKE_SIGMA * usual, SPIKE * float(np.nanquantile(np.abs(x), MOSTLY)))
     at = np.flatnonzero(np.abs(off) > least)
     at = at[(at >= 4) & (at < x.size - 4)]
+    if at.size:
+        at = at[np.abs(off[at]) > STEPS * _step(x)]
     around = np.stack([off[at + k] for k in (-2, -1, 1, 2)], axis=1) / off[at, None]
     return at[np.all(np.abs(around - LONE) < SHAPE, axis=1)]

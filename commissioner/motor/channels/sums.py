@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 OPEN_SUM, OPEN_SUM_OF_PHASES = 0.12, 0.3
 """Share of three channels that their sum holds, from which one is no line of this motor (a gain of 1.3); voltages to a star point may hold that of the
 mains' own zero sequence."""
+LARGEST_SUM_AT_REST = 0.06
+"""Of a current at standstill, what the three may leave in step with one of them: sensors differ by a few per cent."""
 FED = 0.3
 """Of the rated peak, in all three together: with less the motor is not fed, and noise has no sum."""
 MOSTLY = 0.75
@@ -68,6 +70,18 @@ def open_sum(
     share = float(np.quantile(np.abs(x.sum(axis=0)), MOSTLY)) / max(size, 1e-12)
     limit = OPEN_SUM_OF_PHASES if may_move else OPEN_SUM
     return _named(x, share, limit, kind, names) if share > limit else None
+
+
+def left_in_step(currents: Sequence[Signal]) -> tuple[float, int]:
+    """(share of three currents that their sum holds in step with one of them, beyond what noise makes; that one): noise and offsets are in step with none."""
+    phases = [i - np.mean(i) for i in currents]
+    total = np.sum(phases, axis=0)
+    largest = max(float(np.mean(i * i)) for i in phases)
+    noise = [float(np.var(np.diff(i, 2))) / 6.0 for i in phases]
+    shares = [
+        max(abs(float(np.mean(total * i))) - n, 0.0) / max(largest, 1e-300) for i, n in zip(phases, noise, strict=True)
+    ]
+    return max(shares), int(np.argmax(shares))
 
 
 def _named(x: Array, share: float, limit: float, kind: str, names: Sequence[str]) -> OpenSum:

@@ -21,6 +21,7 @@ from commissioner.monitor.loads.pairing_by_start import wired_in
 from commissioner.monitor.partial import OF_MODEL, Partial, of_terminals, refused_audit
 from commissioner.monitor.periods.periods import slip_of
 from commissioner.motor import standing
+from commissioner.motor.channels.faults import currents_on_time
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
@@ -46,6 +47,7 @@ def in_its_states(
         return _not_watched(recording, carrier), recording, []
     if carrier is not None:
         recording = replace(recording, notes=(*recording.notes, ReadingNote(carrier.code, carrier.what)))
+    recording, wishes = _on_time(recording, plate, wishes)
     stretches = states(recording, plate)
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if {s.state for s in stretches} <= {"steady", "lost"}:
@@ -75,6 +77,15 @@ def in_its_states(
         if stretch in watched:
             _add_own(state, watched[stretch], plate)
     return watched[longest], part, out
+
+
+def _on_time(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -> tuple[RunningRecording, Wishes]:
+    """The recording with its currents beside their voltages where a start shows how late they are, and how well that is known."""
+    recording, behind = currents_on_time(recording, np.sqrt(2.0 / 3.0) * plate.rated_voltage_v)
+    if behind is None:
+        return recording, wishes
+    known = behind.std_s if behind.is_told else float(np.hypot(behind.std_s, behind.late_s))
+    return recording, replace(wishes, skew_std_s=min(wishes.skew_std_s, known))
 
 
 def _wired_alike(
@@ -154,13 +165,19 @@ def _add_own(state: State, seen: Observation | Refused, plate: Nameplate) -> Non
     state["withheld"] = ("from current, voltage and plate only: " if of_terminals_alone else "") + seen.reason.what
     if not of_terminals_alone:
         return
-    terminal = from_terminals(seen.audited.fundamental, plate, power_wander_w(seen.audited))
+    terminal = _terminals(seen.audited, plate)
     if terminal is not None:
         speed = _by_shaft(seen, terminal, plate)
         state["mean_speed_rad_per_s"] = {"value": speed.value, "std": speed.std}
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
         if speed.value != terminal.speed_rad_per_s:
             state["withheld"] = f"torque {state['withheld']}"
+
+
+def _terminals(audited: Audited, plate: Nameplate, *, moves: bool = True, is_late: bool = True) -> Terminals | None:
+    """What they say of a stretch; without what its load moves by, or what a delay of the currents would do, in the deviations."""
+    late_s = audited.sensors.skew_std_s if is_late else 0.0
+    return from_terminals(audited.fundamental, plate, power_wander_w(audited) if moves else 0.0, late_s)
 
 
 def _by_shaft(seen: Refused, terminal: Terminals, plate: Nameplate) -> Quantity:
@@ -188,13 +205,27 @@ def longest_steady(
 
 def _load_moves(audited: Audited, plate: Nameplate) -> Finding | None:
     """Where a load that drifts or swings is as much of the stated deviation as all that terminals do not know."""
-    still, stated = (from_terminals(audited.fundamental, plate, w) for w in (0.0, power_wander_w(audited)))
+    still, stated = _terminals(audited, plate, moves=False), _terminals(audited, plate)
     if still is None or stated is None or stated.torque_std_nm < np.sqrt(2.0) * still.torque_std_nm:
         return None
     moves = float(np.sqrt(stated.torque_std_nm**2 - still.torque_std_nm**2))
     return Finding(
         "load_moves", "note", f"the load moves by {moves:.2g} N m (rms) within the stretch: that is in the torque's standard deviation",
         moves, still.torque_std_nm, "record at steady load",
+    )  # fmt: skip
+
+
+def _delay_open(audited: Audited, plate: Nameplate) -> Finding | None:
+    """Where a delay that nothing tells is as much of the stated deviation as all else that terminals do not know."""
+    told, stated = _terminals(audited, plate, is_late=False), _terminals(audited, plate)
+    if told is None or stated is None or stated.torque_std_nm < np.sqrt(2.0) * told.torque_std_nm:
+        return None
+    late_s = audited.sensors.skew_std_s
+    by = float(np.sqrt(stated.torque_std_nm**2 - told.torque_std_nm**2))
+    return Finding(
+        "delay_open", "note",
+        f"whether all currents are late against the voltages a steady stretch does not tell: {late_s * 1e6:.2g} us of it are {by:.2g} N m, which are in the torque's standard deviation",
+        by, told.torque_std_nm, "record from before the contactor closes: a start tells the delay",
     )  # fmt: skip
 
 
@@ -216,14 +247,14 @@ def said_by_terminals(seen: Refused, stretches: list[State], plate: Nameplate) -
         withheld["from other states"] = (
             f"{unused}: `identify` and `diagnose` use a start, a ramp or a load step, this verb does not"
         )
-    moves = _load_moves(seen.audited, plate)
+    notes = (_load_moves(seen.audited, plate), _delay_open(seen.audited, plate))
     f = seen.audited.fundamental
     indicators = {} if f is None else of_terminals(f)
     if f is not None:
         indicators["slip"] = slip_of(speed["value"], 2 * np.pi * f.frequency_hz, plate.pole_pairs)
     return Partial(
         Quantity(speed["value"], speed["std"] or 0.0), Quantity(torque["value"], torque["std"] or 0.0), best["frequency_hz"],
-        (), indicators, withheld, () if moves is None else (moves,),
+        (), indicators, withheld, tuple(note for note in notes if note is not None),
     )  # fmt: skip
 
 

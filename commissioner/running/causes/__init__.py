@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from commissioner.estimation.record import Record
-from commissioner.running.causes.cause import Cause, Confounder
+from commissioner.running.causes.cause import Cause, Confounder, Values
 from commissioner.running.causes.iron import iron_loss, leakage_saturation, magnetizing_saturation
 from commissioner.running.causes.rotor import rotor_asymmetry, rotor_heating, rotor_skin_effect
 from commissioner.running.causes.sensors import (
+    sample_period,
     sampling_delay,
     sensor_gain_mismatch,
     sensor_lag,
@@ -25,7 +26,7 @@ CATALOGUE: dict[str, Cause] = {
     for room in (
         magnetizing_saturation, leakage_saturation, iron_loss, rotor_skin_effect, rotor_heating, rotor_asymmetry, stator_heating,
         stator_asymmetry, line_resistance, dead_time, sensor_gain_mismatch, sensor_offset, sampling_delay, sensor_lag,
-        voltage_gain_mismatch, voltage_offset, speed_sensor_gain, speed_sensor_lag,
+        voltage_gain_mismatch, voltage_offset, speed_sensor_gain, sample_period, speed_sensor_lag,
     )
 }  # fmt: skip
 
@@ -34,6 +35,11 @@ def confounders_of(name: str) -> dict[str, str]:
     """Who may look the same, with what tells them apart; stated in one file, known both ways."""
     own = {c.name: c.told_apart_by for c in CATALOGUE[name].confounders}
     return own | {o.name: c.told_apart_by for o in CATALOGUE.values() for c in o.confounders if c.name == name}
+
+
+def goes_by(name: str, record: Record, values: Values) -> tuple[str, ...]:
+    """Whose the numbers of this cause may be in this recording, the likeliest first."""
+    return CATALOGUE[name].goes_by(record, values) or (name,)
 
 
 def always_tied(name: str) -> tuple[str, ...]:

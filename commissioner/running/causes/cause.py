@@ -46,7 +46,8 @@ class Cause:
 
     `allows`: what else physics demands of its numbers. `common`: what share of themselves all resistances and inductances are off by
     if one channel alone is wrong, for which one the data do not tell. `scenario`: entry of [effects] in the simulator; derivatives are those of
-    the kernel's lines, exact by complex step. `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
+    the kernel's lines, exact by complex step. `goes_by`: whose its numbers may be in this
+    recording, the likeliest first, where not its own alone; `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Cause:
     is_of_measurement: bool = False
     allows: Callable[[Values, Scales], bool] = field(default=lambda _, __: True)
     common: Callable[[Values], float] = field(default=lambda _: 0.0)
+    goes_by: Callable[[Record, Values], tuple[str, ...]] = field(default=lambda _, __: ())
     negative_sequence: Literal["", "adds", "impedes"] = ""
 
     def size(self, values: Values, scales: Scales) -> float:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.estimation.checks import BLOCK_S
 from commissioner.estimation.fit import Fit, Machine, Problem, residuals, simulate
-from commissioner.estimation.record import BLOCK_S, STATES
+from commissioner.estimation.record import STATES
 from commissioner.running.residual.shaft_lines import ShaftLine, without_shaft_lines
 
 Array = NDArray[np.float64]

@@ -6,16 +6,8 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.record import (
-    MONITORED_RATE,
-    MONITORED_S,
-    OPENING_S,
-    STATES,
-    between,
-    negative_sequence,
-    noise_of,
-    prepare,
-)
+from commissioner.estimation.checks import MONITORED_RATE, MONITORED_S, noise_of
+from commissioner.estimation.record import OPENING_S, STATES, between, negative_sequence, prepare
 from commissioner.monitor.intake import clock
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance

@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.record import prepare, scales_of
-from commissioner.motor.channels.clock import off_mains
+from commissioner.motor.channels.clock import of_speed_gain, off_mains, turning_hz
 from commissioner.motor.channels.ends import clipped, runs_into, unwrapped
-from commissioner.motor.channels.faults import no_lines, put_on_time, put_right
+from commissioner.motor.channels.faults import no_lines, put_on_time, put_right, put_right_at_rest
 from commissioner.motor.channels.late import late, shifted
 from commissioner.motor.channels.rows import written_twice
+from commissioner.motor.channels.spikes import without_spikes
+from commissioner.motor.computed import is_negative_sum
 from commissioner.records import StandstillRecording
 from sim.motoring.recording import record
 from tests.running_effects.cases import Case, as_plate, as_recording, taken
@@ -282,10 +285,75 @@ def test_another_unit_is_named_for_what_it_is(start, change, says):
 def test_a_supply_that_is_off_the_mains_is_said_and_one_of_an_inverter_is_not(start):
     recording, plate = start
     slow = replace(recording, time_s=1.01 * recording.time_s, sample_period_s=1.01 * recording.sample_period_s)
-    assert any("if it is the mains, the sample period is 1.0 % too long" in r for r in prepare([slow], plate).remarks)
+    # mains of 50.029 Hz by the key
+    assert any("if it is the mains, the sample period is 0.9 % too long" in r for r in prepare([slow], plate).remarks)
     driven = replace(slow, metadata={**slow.metadata, "switching_frequency_hz": 4000.0})
     assert not any("mains" in r for r in prepare([driven], plate).remarks)
     assert off_mains(50.1) is None and off_mains(45.0) is None and "too short" in (off_mains(60.6) or "")
+
+
+def test_a_supply_is_told_beside_its_harmonics_whichever_way_it_turns():
+    """By its turning from sample to sample 2 % of a fifth made it 0.2 % too slow."""
+    turn = 2.0 * np.pi * 49.87 * 2e-4 * np.arange(5000)
+    forward = np.exp(1j * turn) + 0.03 * np.exp(-1j * turn) + 0.03 * np.exp(-5j * turn + 1j) + 0.02 * np.exp(7j * turn)
+    for vector in (forward, forward.conj()):
+        assert turning_hz(vector, 2e-4, 50.3) == pytest.approx(49.87, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("supply_hz", "gain", "whose"),
+    [
+        (49.505, 0.0099, "period"), (60.6, -0.01, "period"), (50.01, 0.01, "sensor"), (60.05, -0.05, "sensor"), (49.85, 0.003, "either"),
+        (50.02, 0.001, "either"), (49.5, 0.03, "either"), (33.0, 0.01, "either"), (None, 0.01, "either"),
+    ],
+)  # fmt: skip
+def test_a_gain_of_the_speed_is_the_sample_periods_where_the_mains_say_so(supply_hz, gain, whose):
+    assert of_speed_gain(supply_hz, gain) == whose
+
+
+def with_drift(recording, kind, k, by, time_s=0.0):
+    """The offset of channel k drifts by so much, along a line or exponentially in `time_s`."""
+    share = recording.time_s / recording.time_s[-1]
+    if time_s:
+        share = (1.0 - np.exp(-recording.time_s / time_s)) / (1.0 - np.exp(-recording.time_s[-1] / time_s))
+    return with_channel(recording, kind, k, lambda *three: three[k] + by * share)
+
+
+@pytest.mark.parametrize(
+    ("kind", "by", "time_s"), [("currents_a", 0.5, 0.0), ("currents_a", -2.5, 1.0), ("voltages_v", 3.3, 0.0)]
+)
+def test_an_offset_that_drifts_is_taken_off_and_said(start, kind, by, time_s):
+    """1 % of the rated peak ended as `unexplained`, or as a gain, a bad line and channels 8 us late."""
+    recording, _ = start
+    mended = put_right(with_drift(recording, kind, 1, by, time_s))
+    (note,) = mended.notes
+    assert (
+        note.code == "drifting_offset"
+        and f"drifts by {'-' if by < 0.0 else '+'}" in note.what
+        and "taken off" in note.what
+    )
+    off = getattr(mended, kind)[1] - getattr(recording, kind)[1]
+    assert np.ptp(off) < 0.12 * abs(by) and ("exponentially" in note.what) == (time_s > 0.0)
+
+
+def test_what_a_motor_or_a_ramp_or_a_voltage_that_drives_it_does_is_no_drift(start):
+    recording, _ = start
+    decays = 5.0 * np.exp(-recording.time_s / 0.5)
+    u, v, w = recording.currents_a
+    assert put_right(replace(recording, currents_a=(u + decays, v - 0.5 * decays, w - 0.5 * decays))).notes == ()
+    direct = with_drift(with_drift(recording, "voltages_v", 0, 3.0), "currents_a", 0, 20.0)
+    assert all("voltage" not in n.what for n in put_right(direct).notes)
+    ramp, _, _ = taken(Case(5101, "null", "ramp").scenario(), 5101)
+    assert put_right(ramp).notes == ()
+
+
+def test_a_third_current_that_was_computed_stays_so_where_another_drifts_and_two_are_enough(start):
+    recording, _ = start
+    u, v = (np.round(x, 3) for x in with_drift(recording, "currents_a", 1, 1.0).currents_a[:2])
+    mended = put_right(replace(recording, currents_a=(u, v, np.round(-(u + v), 3))))
+    assert [n.code for n in mended.notes] == ["drifting_offset"] * 2 and is_negative_sum(*mended.currents_a)
+    two = put_right(replace(recording, currents_a=(u, v, np.full(u.size, np.nan))))
+    assert [n.what.split(" drifts")[0] for n in two.notes] == ["the offset of current v"]
 
 
 def test_without_a_speed_the_rest_of_a_start_is_not_used(start):
@@ -330,3 +398,69 @@ def test_the_other_half_of_a_period_is_no_copy():
     lines = [np.cos(2.0 * np.pi * 50.0 * time_s - k * 2.0944) for k in range(6)]
     half = [np.where(time_s < 0.01, x, -np.roll(x, 50)) for x in lines]  # to the bit, as no noise would leave it
     assert written_twice([x[:100] for x in half], np.ones(100, bool)) is None
+
+
+@pytest.fixture
+def at_rest():
+    """Tones along three axes in turn at 5 kHz; one channel carries next to nothing along the first."""
+    period, rng = 2e-4, np.random.default_rng(9)
+    time = period * np.arange(9000)
+    wave = 2.0 * np.sin(50.0 * time) + 0.8 * np.sin(400.0 * time) + 0.2 * np.sin(1700.0 * time)
+    axis = np.repeat([90.0, 30.0, 150.0], 3000)
+    turns = np.deg2rad(axis[:, None] - [0.0, 120.0, 240.0])
+    u, v, w = (np.round(wave * np.cos(turn) + 1e-3 * rng.standard_normal(time.size), 3) for turn in turns.T)
+    return StandstillRecording(time, np.repeat([0, 1, 2], 3000), axis, wave, u, v, w, None, period)
+
+
+def test_spikes_wraps_and_a_turned_sensor_at_standstill_are_put_right_as_of_a_running_motor(at_rest):
+    assert put_right_at_rest(at_rest) is at_rest
+    spiked, rows = at_rest.current_v_a.copy(), np.array([700, 4100, 8200])
+    spiked[rows] += 5.0
+    for changed, code, close in (
+        ({"current_v_a": spiked}, "spikes", 0.02),
+        ({"current_w_a": wrapped(at_rest.current_w_a, 2.0)}, "wrapped", 1e-3),
+        ({"current_u_a": -at_rest.current_u_a}, "polarity", 0.0),
+    ):
+        for one in (at_rest, replace(at_rest, current_w_a=None)):
+            if one.current_w_a is None and code != "spikes":
+                continue
+            mended = put_right_at_rest(replace(one, **changed))
+            assert [n.code for n in mended.notes] == [code]
+            (name,) = changed
+            np.testing.assert_allclose(getattr(mended, name), getattr(at_rest, name), atol=close)
+    assert put_right_at_rest(replace(at_rest, averaged=np.ones(9000, dtype=int), current_v_a=spiked)).notes == ()
+
+
+def test_a_converters_step_in_a_channel_without_current_is_no_spike():
+    x = np.zeros(5000)
+    x[::300] = 0.01
+    assert without_spikes(x)[1] == 0
+    x[1000:1003] = (0.0, 5.0, 0.0)
+    assert without_spikes(x)[1] == 1
+
+
+def low_passed(x, time_s, period_s):
+    """First order, by its exponential (the trapezoidal rule between samples of 25 us)."""
+    a = np.exp(-period_s / time_s)
+    return lfilter([0.5 * (1.0 - a)] * 2, [1.0, -a], x)
+
+
+@pytest.mark.parametrize(
+    ("time_s", "filtered", "noise", "says"),
+    [
+        (4e-4, True, 0.02, "passes a low pass of"), (4e-4, False, 0.02, "taken one after another)"), (1e-4, True, 0.4, "or a low pass)"),
+        (1e-4, False, 0.4, "or a low pass)"),
+    ],
+)  # fmt: skip
+def test_a_low_pass_in_one_channel_is_told_from_a_delay_where_noise_does_not_hide_what_they_differ_by(
+    without_noise, time_s, filtered, noise, says
+):
+    recording, _ = without_noise
+    period = recording.sample_period_s
+    if filtered:
+        one = with_channel(recording, "currents_a", 1, lambda u, v, w: low_passed(v, time_s, period))
+        one = taken_at(one, "currents_a", (0, 0, 0), noise=noise)
+    else:
+        one = taken_at(recording, "currents_a", (0, round(time_s / period), 0), noise=noise)
+    (note,) = put_right(one).notes
+    assert says in note.what and note.what.endswith(": shifted back")
