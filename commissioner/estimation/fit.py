@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -378,6 +378,20 @@ class Fit:
             return 0.0
         place = self.place(name)
         return float(np.sqrt(self.covariance()[place, place]) * self.machine.slope()[AT[name]])
+
+
+def made_of(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, tuple[float, Array]]:
+    """What is made of the machine's numbers, by name: its value and by how much each column of the fit moves it."""
+    values, slope = fit.machine.values(), fit.machine.slope()
+    known = made(values)
+    gradient = {name: np.zeros(len(fit.columns)) for name in known}
+    for j, number in ((j, NAMES[c.index]) for j, c in enumerate(fit.columns) if c.kind == "p"):
+        h = 1e-5 * max(abs(values[number]), 1e-4)
+        for sign in (1.0, -1.0):
+            moved = made({**values, number: values[number] + sign * h})
+            for name in known:
+                gradient[name][j] += sign * moved.get(name, known[name]) / (2.0 * h) * slope[AT[number]]
+    return {name: (float(x), gradient[name]) for name, x in known.items()}
 
 
 def numbers_of(names: Sequence[str], record: Record) -> tuple[Column, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from commissioner.estimation.hidden import at_small_slip
 from commissioner.estimation.record import Record
 
 TAIL_S = 0.1
@@ -50,7 +51,8 @@ def at_flux(record: Record, values: Mapping[str, float]) -> dict[str, float]:
     """
     _, current, _ = _ends_with(record)
     stator = stator_flux_wb(record, values)
-    leakage, main = values["leakage_inductance"], values["magnetizing_inductance"]
+    four = at_small_slip(values)
+    leakage, main = four.leakage_inductance_h, four.magnetizing_inductance_h
     split = values["leakage_split"] / (1.0 + values["leakage_split"])
     rated = record.scales.voltage_v / record.scales.frequency_rad_per_s
     share, added = 0.0, 0.0
@@ -61,5 +63,5 @@ def at_flux(record: Record, values: Mapping[str, float]) -> dict[str, float]:
     g = 1.0 / (1.0 + (1.0 - share) * added * leakage / main)
     return {
         "magnetizing_inductance_h": main * g * g / (1.0 + g * added),
-        "rotor_time_constant_s": main / values["rotor_resistance"] / (1.0 + g * added),
+        "rotor_time_constant_s": four.rotor_time_constant_s / (1.0 + g * added),
     }

@@ -9,8 +9,9 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.cancelling import TimeOver
-from commissioner.estimation.fit import Fit, problem_of, simulate
-from commissioner.estimation.numbers import AT, FOUR, NAMES
+from commissioner.estimation.fit import Fit, made_of, problem_of, simulate
+from commissioner.estimation.hidden import at_small_slip, by_laws
+from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record, negative_sequence, prepare
 from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
@@ -151,7 +152,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         )
     saturated: Mapping[str, Quantity] = {}
     if is_saturated(found.fit.machine.values()):
-        saturated = _with_errors(found.fit, lambda values: at_flux(record, values))
+        saturated = _of_motor(found.fit, lambda values: at_flux(record, values))
     return Diagnosis(
         verdict, reason, causes, gain, left, _parameters(found.nominal), _with_trifles(found, {**_parameters(found.fit), **saturated}),
         next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record) if found.is_complete else None,
@@ -254,19 +255,19 @@ def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
 
 def _with_errors(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, Quantity]:
     """What is made of the machine's numbers, with standard deviations from the covariance of all that was free."""
-    values, slope, covariance = fit.machine.values(), fit.machine.slope(), fit.covariance()
-    known = made(values)
-    gradient = {name: np.zeros(len(fit.columns)) for name in known}
-    for j, number in ((j, NAMES[c.index]) for j, c in enumerate(fit.columns) if c.kind == "p"):
-        h = 1e-5 * max(abs(values[number]), 1e-4)
-        for sign in (1.0, -1.0):
-            moved = made({**values, number: values[number] + sign * h})
-            for name in known:
-                gradient[name][j] += sign * moved.get(name, known[name]) / (2.0 * h) * slope[AT[number]]
+    covariance, told = fit.covariance(), made_of(fit, made)
     return {
-        name: Quantity(float(x), float(np.sqrt(max(float(gradient[name] @ covariance @ gradient[name]), 0.0))))
-        for name, x in known.items()
+        name: Quantity(x, float(np.sqrt(max(float(moved @ covariance @ moved), 0.0))))
+        for name, (x, moved) in told.items()
     }
+
+
+def _of_motor(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, Quantity]:
+    """The same of the motor's own numbers: that nobody knows where iron loses and what form bars have is in their errors too."""
+    told = made_of(fit, made)
+    by_law = by_laws(fit, np.array([moved for _, moved in told.values()]))
+    laws = dict(zip(told, np.sqrt(np.sum(by_law**2, axis=0)).tolist(), strict=True))
+    return {name: Quantity(q.value, float(np.hypot(q.std, laws[name]))) for name, q in _with_errors(fit, made).items()}
 
 
 def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[DiagnosisVerdict, str]:
@@ -304,13 +305,12 @@ def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Diag
 
 
 def _parameters(fit: Fit) -> dict[str, Quantity]:
-    out = {}
-    for name, key in zip(FOUR, PARAMETERS, strict=True):
-        out[key] = Quantity(fit.machine.value(name), fit.std(name))
-    time_constant = fit.machine.value("magnetizing_inductance") / fit.machine.value("rotor_resistance")
-    covariance = fit.covariance()
-    spread = covariance[3, 3] + covariance[1, 1] - 2.0 * covariance[1, 3]
-    out["rotor_time_constant_s"] = Quantity(time_constant, float(time_constant * np.sqrt(max(spread, 0.0))))
+    out = _of_motor(fit, _four)
     if fit.machine.has_shaft and any(c.kind == "p" and c.index == AT["inertia"] for c in fit.columns):
         out["inertia_kg_m2"] = Quantity(fit.machine.value("inertia"), fit.std("inertia"))
     return out
+
+
+def _four(values: Mapping[str, float]) -> dict[str, float]:
+    four = at_small_slip(values)
+    return {**dict(zip(PARAMETERS, four.as_tuple(), strict=True)), "rotor_time_constant_s": four.rotor_time_constant_s}

@@ -21,12 +21,13 @@ from commissioner.estimation.fit import (
     Machine,
     Problem,
     jacobian,
+    made_of,
     problem_of,
     refine,
     simulate,
 )
 from commissioner.estimation.held import best_reading
-from commissioner.estimation.hidden import by_laws, drawn_aside, told_in, with_told
+from commissioner.estimation.hidden import at_small_slip, by_laws, drawn_aside, told_in, with_told
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
@@ -97,10 +98,11 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     fit = with_told(problem, fit)
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
-    noise_only = _of_four(fit, fit.covariance())
+    moves = _moves(fit)
+    noise_only = moves @ fit.covariance() @ moves.T
     whole = _covariance(problem, fit)
-    beside = np.vstack([by_lag, by_laws(fit)])  # a filter or a counter, where iron acts: not known
-    covariance = _of_four(fit, whole) + beside.T @ beside
+    beside = np.vstack([by_lag, by_laws(fit, moves)])  # a filter or a counter, where iron acts: not known
+    covariance = moves @ whole @ moves.T + beside.T @ beside
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
         raise record.refusal_of_standing("identify") or DataRefused(
@@ -108,10 +110,10 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
             limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque; one steady load is for `commissioner monitor`",
         )  # fmt: skip
     aside = drawn_aside(problem, fit)
-    whole, covariance = whole + aside.T @ aside, covariance + _of_four(fit, aside.T @ aside)
+    whole, covariance = whole + aside.T @ aside, covariance + moves @ aside.T @ aside @ moves.T
     left = lack_of_fit(problem, fit.machine)
     inertia, load = _shaft(problem, fit, covariance, _inertia_of(fit, whole))
-    four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
+    four = at_small_slip(fit.machine.values())
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
     bound = {name: quantity.std for name, quantity in _parameters(four, noise_only / fit.scale).items()}
     return Identified(
@@ -170,10 +172,10 @@ def _by_inertia(problem: Problem, fit: Fit) -> Array:
     return np.asarray(OF_ASSUMED_INERTIA * fit.influence() @ (fit.jacobian @ along))
 
 
-def _of_four(fit: Fit, covariance: Array) -> Array:
-    """That of the logarithms of R_s, R_R, L_sigma, L_M."""
-    own = [next(j for j, c in enumerate(fit.columns) if c.kind == "p" and c.index == AT[n]) for n in FOUR]
-    return covariance[np.ix_(own, own)]
+def _moves(fit: Fit) -> Array:
+    """(four, columns): by how much each column moves the logarithms of R_s, R_R, L_sigma, L_M at small slip."""
+    told = made_of(fit, lambda values: dict(zip(FOUR, np.log(at_small_slip(values).as_tuple()).tolist(), strict=True)))
+    return np.array([told[name][1] for name in FOUR])
 
 
 def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
