@@ -167,13 +167,13 @@ def drawn_aside(problem: Problem, fit: Fit) -> Array:
 
 def by_laws(fit: Fit, moves: Array) -> Array:
     """(causes, rows): what is not known of what the columns move by `moves` (rows, columns), for the law of a cause in the fit is not known: a
-    share of what it moved them by."""
+    share of what it moved them by, through the other numbers and by itself (of bars, what leaks in them at small slip)."""
     covariance, rows = fit.covariance(), []
     for hidden in told_in(fit):
         if hidden.of_law:
             own = fit.place(hidden.size)
-            moved = fit.machine.value(hidden.size) * (moves @ covariance[:, own]) / covariance[own, own]
-            rows.append(hidden.of_law * moved)
+            size = hidden.of_law * fit.machine.value(hidden.size)
+            rows += [size * (moves @ covariance[:, own]) / covariance[own, own], size * moves[:, own]]
     return np.array(rows).reshape(-1, len(moves))
 
 
