@@ -193,11 +193,8 @@ def _left_open(found: Found) -> Iterator[str]:
     """What a named cause leaves open of all parameters."""
     values = dict(zip(NAMES, found.fit.machine.physical(), strict=True))
     for one in found.accepted:
-        if share := CATALOGUE[one.cause].common(values):
-            yield (
-                f"Which of the gains is right is not in the data: if one channel alone is wrong, resistances and inductances are off by "
-                f"{share:.2%} of their values, beside their intervals."
-            )
+        if said := CATALOGUE[one.cause].leaves_open(values):
+            yield said
 
 
 def _gain(found: Found) -> Gain:

@@ -209,9 +209,9 @@ def test_a_cause_that_lost_its_way_along_the_load_is_found_from_the_start_on() -
 
 
 def test_a_start_with_a_bad_contact_does_not_end_astray(monkeypatch: pytest.MonkeyPatch) -> None:
-    """0.4 of R_s in one line: R_s 3.7 times the true, no rotor, 374 000 of chi-square a sample; each cause sought from there was `unexplained`."""
+    """0.8 of R_s in one line: R_s 3.7 times the true, no rotor, 374 000 of chi-square a sample; each cause sought from there was `unexplained`."""
     monkeypatch.setattr(nominal_fit, "STARTS", nominal_fit.STARTS[:1])
-    in_one_line = 0.4 * 2.0 / 3.0 * np.exp(2j * np.pi / 3.0)
+    in_one_line = 0.8 / 3.0 * np.exp(2j * np.pi / 3.0)
     seen = _running(0, 3000, inertia=0.05, load_constant=0.3, line_re=in_one_line.real, line_im=in_one_line.imag)
     fitted = with_shaft(problem_of(prepare([seen], PLATE), 0.0))
     assert all(fitted.machine.value(name) == pytest.approx(true, rel=0.1) for name, true in FOUR.items())
