@@ -13,7 +13,7 @@ from scipy.signal import savgol_filter
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
-from commissioner.motor.channels.clock import off_mains, wrong_unit
+from commissioner.motor.channels.clock import off_mains, turn_a_row, wrong_unit
 from commissioner.motor.channels.faults import no_lines, without_clipped
 from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.motor.computed import is_negative_sum
@@ -450,29 +450,10 @@ def _supply_hz(one: RunningRecording, voltage: Array, scales: Scales) -> float:
     least, median, most = np.quantile(turn[is_fed], (0.1, 0.5, 0.9))
     if most - least >= STEADY_TURN * median:
         return 0.0
-    return (
-        _over_a_period(voltage, is_fed, _block(one), float(median) * one.sample_period_s)
-        / one.sample_period_s
-        / (2 * np.pi)
-    )
-
-
-def _over_a_period(voltage: Array, is_fed: Bools, block: int, turn: float) -> float:
-    """`turn` (rad a row) by rows a period apart, where harmonics and the unbalance stand again as they stood (median of the blocks fed).
-
-    From one row to the next they turn the vector too: 3 % of a 5th and of unbalance made 49.77 Hz of 50.
-    """
-    rows = max(round(2 * np.pi / turn), 1)
-    v = np.nan_to_num(voltage[: is_fed.size * block, 0] + 1j * voltage[: is_fed.size * block, 1])
-    sense = np.sign(np.sum(np.conj(v[:-1]) * v[1:]).imag)
-    begin = np.flatnonzero(is_fed) * block
-    begin = begin[begin + block + rows <= v.size]
-    begin = begin[is_fed[(begin + block + rows - 1) // block] & is_fed[(begin + rows) // block]]
-    if begin.size == 0:
-        return turn
-    first = v[begin[:, None] + np.arange(block)]
-    later = v[begin[:, None] + np.arange(block) + rows]
-    return float(2 * np.pi + sense * np.median(np.angle(np.sum(np.conj(first) * later, axis=1)))) / rows
+    block, v = _block(one), np.nan_to_num(voltage[:, 0] + 1j * voltage[:, 1])
+    in_three = np.flatnonzero(is_fed[:-2] & is_fed[1:-1] & is_fed[2:])
+    turns = [abs(turn_a_row(v[k * block : (k + 3) * block])) for k in in_three]
+    return float(np.median(turns) / one.sample_period_s if turns else median) / (2 * np.pi)
 
 
 def _check_stamps(one: RunningRecording) -> None:

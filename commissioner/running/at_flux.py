@@ -8,6 +8,7 @@ import numpy as np
 
 from commissioner.estimation.hidden import at_small_slip
 from commissioner.estimation.record import Record
+from commissioner.motor.channels.clock import turn_a_row
 
 TAIL_S = 0.1
 SIDES = ("stator", "gap", "rotor")
@@ -27,7 +28,7 @@ def _ends_with(record: Record) -> tuple[complex, complex, float]:
     w = record.windows[-1]
     many = min(max(round(TAIL_S / record.period_s), 10), w.count)
     u, i = (x[-many:, 0] + 1j * x[-many:, 1] for x in (w.voltage[::2], w.current))
-    turn = float(np.angle(np.sum(np.conj(u[:-1]) * u[1:])))
+    turn = turn_a_row(u)
     window = np.hanning(many) * np.exp(-1j * turn * np.arange(many))
     return (
         complex(u @ window / np.hanning(many).sum()),

@@ -33,6 +33,7 @@ from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import BLOCK_S, STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
+from commissioner.motor.channels.clock import turn_a_row
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -282,8 +283,7 @@ def _flux(record: Record) -> float:
     w = record.windows[-1]
     u = w.voltage[::2, 0] + 1j * w.voltage[::2, 1]
     tail = u[-max(round(0.1 / record.period_s), 10) :]
-    turn = float(np.abs(np.angle(np.sum(np.conj(tail[:-1]) * tail[1:])))) / record.period_s
-    return float(np.median(np.abs(tail)) / max(turn, 1e-9))
+    return float(np.median(np.abs(tail)) / max(abs(turn_a_row(tail)) / record.period_s, 1e-9))
 
 
 def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | None, fit: Fit) -> tuple[str, ...]:

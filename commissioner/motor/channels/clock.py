@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 THOUSANDS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 NEAR = 2.0
 """Factor between the plate's frequency and that of a supply which a thousand cannot be taken for."""
@@ -28,3 +31,17 @@ def off_mains(supply_hz: float) -> str | None:
         f"the supply turns at {supply_hz:.4g} Hz by the time column, {100.0 * off:+.1f} % from {nearest:g} Hz: if it is the mains, the sample "
         f"period is {abs(100.0 * off):.1f} % too {'long' if off < 0.0 else 'short'}, and inductances, times and the inertia with it"
     )
+
+
+def turn_a_row(vector: NDArray[np.complex128]) -> float:
+    """rad by which a supply's vector turns from row to row, by rows a period apart, where harmonics and its unbalance stand as they stood.
+
+    Between neighbours they turn it too: 3 % of a 5th and of unbalance made 49.77 Hz of 50. Of less than two periods it is that.
+    """
+    turn = float(np.angle(np.sum(np.conj(vector[:-1]) * vector[1:])))
+    for _ in range(2):  # the first count of rows may be one off
+        rows = round(2 * np.pi / abs(turn)) if turn else 0
+        if 0 < rows <= vector.size // 2:
+            off = float(np.angle(np.hanning(vector.size - rows) @ (np.conj(vector[:-rows]) * vector[rows:])))
+            turn = (float(np.copysign(2 * np.pi, turn)) + off) / rows
+    return turn
