@@ -15,8 +15,8 @@ from commissioner.estimation.kernels.march import NO_ROW, STATES, UNSET, Directi
 from commissioner.estimation.kernels.whitening import whiten
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
+from commissioner.estimation.record import BLOCK_S, Record, Window, first_part
 from commissioner.estimation.record import STATES as RECORD_STATES
-from commissioner.estimation.record import Record, Window, first_part
 from commissioner.estimation.told import Slopes, Told, told
 
 Array = NDArray[np.float64]
@@ -378,6 +378,17 @@ class Fit:
             return 0.0
         place = self.place(name)
         return float(np.sqrt(self.covariance()[place, place]) * self.machine.slope()[AT[name]])
+
+
+def scattered(problem: Problem, fit: Fit) -> Array:
+    """Covariance of the columns' numbers, never below what the sums of gradient over blocks of 20 ms scatter by, which hold what is left with a
+    structure of its own (cluster-robust: Liang, Zeger 1986, DOI 10.1093/biomet/73.1.13)."""
+    block = max(round(BLOCK_S / problem.period), 1) * (3 if problem.noise.has_zero else 2)
+    sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
+    moves = fit.influence()
+    scatter = np.sum((moves @ sums) ** 2, axis=1)
+    wider = np.sqrt(np.maximum(scatter / np.maximum(fit.scale * moves.diagonal(), 1e-300), 1.0))
+    return np.asarray(fit.covariance() * np.outer(wider, wider))
 
 
 def made_of(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, tuple[float, Array]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.cancelling import TimeOver
-from commissioner.estimation.fit import Fit, made_of, problem_of, simulate
+from commissioner.estimation.fit import Fit, Problem, made_of, problem_of, scattered, simulate
 from commissioner.estimation.hidden import at_small_slip, by_laws
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record, negative_sequence, prepare
@@ -34,6 +34,10 @@ MOSTLY_GUESSES = 0.8
 """Share of the error below which causes beside something unexplained are not named: whatever bends helps a fit a little."""
 LEAST_ERROR = 0.1
 """Power of the held-out error over the noise's, below which there is nothing to gain there."""
+
+
+Made = Callable[[Mapping[str, float]], Mapping[str, float]]
+"""Of a machine's numbers."""
 
 
 @dataclass(frozen=True)
@@ -152,9 +156,9 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         )
     saturated: Mapping[str, Quantity] = {}
     if is_saturated(found.fit.machine.values()):
-        saturated = _of_motor(found.fit, lambda values: at_flux(record, values))
+        saturated = _with_errors(found.problem, found.fit, lambda values: at_flux(record, values))
     return Diagnosis(
-        verdict, reason, causes, gain, left, _parameters(found.nominal), _with_trifles(found, {**_parameters(found.fit), **saturated}),
+        verdict, reason, causes, gain, left, _parameters(found.problem, found.nominal), _with_trifles(found, {**_parameters(found.problem, found.fit), **saturated}),
         next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record) if found.is_complete else None,
         found, record, tuple(remarks), stator_flux_wb=abs(stator_flux_wb(record, found.fit.machine.values())) if saturated else None,
     )  # fmt: skip
@@ -162,10 +166,10 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
 
 def _with_trifles(found: Found, told: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """The parameters, what is too small to be named and moves them counted as an error of theirs."""
-    values = {name: q.value for name, q in _parameters(found.fit).items()}
+    values = {name: q.value for name, q in _parameters(found.problem, found.fit).items()}
     out = dict(told)
     for trifle in found.trifles:
-        for name, moved in _parameters(trifle.fit).items():
+        for name, moved in _parameters(found.problem, trifle.fit).items():
             if name in out:
                 shift = moved.value - values[name]
                 out[name] = Quantity(out[name].value, max(out[name].std, float(np.hypot(told[name].std, shift))))
@@ -178,9 +182,12 @@ def _of_trifles(found: Found) -> Iterator[str]:
         return
     names = ", ".join(dict.fromkeys(t.cause.cause.replace("_", " ") for t in found.trifles))
     strength = max(np.sqrt(t.gain / t.fit.count) for t in found.trifles)
-    values = {name: q.value for name, q in _parameters(found.fit).items() if q.value}
+    values = {name: q.value for name, q in _parameters(found.problem, found.fit).items() if q.value}
     moved = [
-        (q.value / values[k] - 1.0, k) for t in found.trifles for k, q in _parameters(t.fit).items() if k in values
+        (q.value / values[k] - 1.0, k)
+        for t in found.trifles
+        for k, q in _parameters(found.problem, t.fit).items()
+        if k in values
     ]
     share, most = max(moved, key=lambda one: abs(one[0]))
     yield (
@@ -245,26 +252,21 @@ def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
     scales, cause = found.problem.record.scales, CATALOGUE[one.cause]
     units = {name: unit for name, (_, unit) in cause.sizes(found.fit.machine.values(), scales).items()}
     told = _with_errors(
-        found.fit, lambda values: {name: size for name, (size, _) in cause.sizes(values, scales).items()}
-    )
+        found.problem, found.fit, lambda values: {name: size for name, (size, _) in cause.sizes(values, scales).items()},
+        is_by_law=cause.is_sized_by_law(found.problem.record),
+    )  # fmt: skip
     return {name: (q.value, q.std, units[name]) for name, q in told.items()}
 
 
-def _with_errors(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, Quantity]:
-    """What is made of the machine's numbers, with standard deviations from the covariance of all that was free."""
-    covariance, told = fit.covariance(), made_of(fit, made)
-    return {
-        name: Quantity(x, float(np.sqrt(max(float(moved @ covariance @ moved), 0.0))))
-        for name, (x, moved) in told.items()
-    }
-
-
-def _of_motor(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, Quantity]:
-    """The same of the motor's own numbers: that nobody knows where iron loses and what form bars have is in their errors too."""
-    told = made_of(fit, made)
-    by_law = by_laws(fit, np.array([moved for _, moved in told.values()]))
-    laws = dict(zip(told, np.sqrt(np.sum(by_law**2, axis=0)).tolist(), strict=True))
-    return {name: Quantity(q.value, float(np.hypot(q.std, laws[name]))) for name, q in _with_errors(fit, made).items()}
+def _with_errors(problem: Problem, fit: Fit, made: Made, *, is_by_law: bool = True) -> dict[str, Quantity]:
+    """What is made of the machine's numbers, with standard deviations from the covariance of all that was free; `is_by_law`: with what
+    nobody knows of where iron loses and what form bars have."""
+    covariance, told = scattered(problem, fit), made_of(fit, made)
+    moves = np.array([moved for _, moved in told.values()])
+    variance = np.maximum(np.einsum("ij,jk,ik->i", moves, covariance, moves), 0.0)
+    if is_by_law:
+        variance = variance + np.sum(by_laws(fit, moves) ** 2, axis=0)
+    return {name: Quantity(told[name][0], float(std)) for name, std in zip(told, np.sqrt(variance), strict=True)}
 
 
 def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[DiagnosisVerdict, str]:
@@ -301,8 +303,8 @@ def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Diag
     return "explained", "The named causes leave nothing above the noise."
 
 
-def _parameters(fit: Fit) -> dict[str, Quantity]:
-    out = _of_motor(fit, _four)
+def _parameters(problem: Problem, fit: Fit) -> dict[str, Quantity]:
+    out = _with_errors(problem, fit, _four)
     if fit.machine.has_shaft and any(c.kind == "p" and c.index == AT["inertia"] for c in fit.columns):
         out["inertia_kg_m2"] = Quantity(fit.machine.value("inertia"), fit.std("inertia"))
     return out

@@ -24,6 +24,7 @@ from commissioner.estimation.fit import (
     made_of,
     problem_of,
     refine,
+    scattered,
     simulate,
 )
 from commissioner.estimation.held import best_reading
@@ -31,7 +32,7 @@ from commissioner.estimation.hidden import at_small_slip, by_laws, drawn_aside, 
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import BLOCK_S, STATES, Record, first_part, prepare
+from commissioner.estimation.record import STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.channels.clock import turn_a_row
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
@@ -153,16 +154,9 @@ def _earlier(problem: Problem, late_s: float) -> Problem:
 
 
 def _covariance(problem: Problem, fit: Fit) -> Array:
-    """Of the columns' numbers: never below what the sums of gradient over blocks of 20 ms scatter by, which hold what is left with a
-    structure of its own (cluster-robust: Liang, Zeger 1986, DOI 10.1093/biomet/73.1.13)."""
-    covariance = fit.covariance()
-    block = max(round(BLOCK_S / problem.period), 1) * (3 if problem.noise.has_zero else 2)
-    sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
-    moves = fit.influence()
-    scatter = np.sum((moves @ sums) ** 2, axis=1)
-    wider = np.sqrt(np.maximum(scatter / np.maximum(fit.scale * moves.diagonal(), 1e-300), 1.0))
+    """Of the columns' numbers, with what is left and an inertia that is assumed."""
     aside = _by_inertia(problem, fit)
-    return np.asarray(covariance * np.outer(wider, wider) + np.outer(aside, aside))
+    return np.asarray(scattered(problem, fit) + np.outer(aside, aside))
 
 
 def _by_inertia(problem: Problem, fit: Fit) -> Array:

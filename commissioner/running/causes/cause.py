@@ -45,7 +45,8 @@ class Cause:
     """`says` has a `{size}`. `range`: of the first size, what physics allows; outside it is another cause in disguise.
 
     `allows`: what else physics demands of its numbers. `leaves_open`: a sentence on what no data tell of the parameters beside it, the channel
-    or the line that differs from the mean being one alone. `scenario`: entry of [effects] in the simulator; derivatives are those of
+    or the line that differs from the mean being one alone. `is_sized_by_law`: whether a recording tells its sizes by the form of its law, which
+    is not known, so that they have what `by_laws` says in their errors. `scenario`: entry of [effects] in the simulator; derivatives are those of
     the kernel's lines, exact by complex step. `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
     """
 
@@ -66,6 +67,7 @@ class Cause:
     is_of_measurement: bool = False
     allows: Callable[[Values, Scales], bool] = field(default=lambda _, __: True)
     leaves_open: Callable[[Values], str] = field(default=lambda _: "")
+    is_sized_by_law: Callable[[Record], bool] = field(default=lambda _: False)
     negative_sequence: Literal["", "adds", "impedes"] = ""
 
     def size(self, values: Values, scales: Scales) -> float:
