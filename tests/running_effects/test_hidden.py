@@ -60,37 +60,31 @@ def test_bars_of_another_corner_are_in_the_fit(corner: float) -> None:
     assert any("current displacement in the bars" in r for r in found.remarks)
 
 
-@pytest.mark.parametrize("seed", [7])
-def test_beside_bars_of_another_form_the_four_are_those_of_small_slip(seed: int) -> None:
-    """Of two sections: L_sigma of fast currents was said, which nothing that turns at a rated slip shows: 10 errors and 14 and 18 % off that."""
-    recording, plate, truth = taken(Case(seed, "one", "start", only="rotor_skin_effect").scenario(), seed)
+def test_beside_bars_of_another_form_a_diagnosis_has_the_four_of_small_slip() -> None:
+    """Of two sections: L_sigma of fast currents was said, which nothing that turns at a rated slip shows, 14 % off that at a stated 0.05 %, and R_s
+    was 27 stated errors off."""
+    recording, plate, truth = taken(Case(5, "one", "start", only="rotor_skin_effect").scenario(), 5)
     machine, (bars,) = truth["machine"], truth["effects"]
     leaks = machine["rotor_resistance_ohm"] * bars["size"] * (0.65 / 14.0 + 0.35 / 55.0) / (2.0 * np.pi)
     slow = Gamma(
         machine["stator_resistance_ohm"], machine["rotor_resistance_ohm"], machine["leakage_inductance_h"] + leaks,
         machine["inductance_h"],
     ).as_inverse_gamma()  # fmt: skip
-    found = identify([recording], plate)
+    seen = diagnose([recording], plate)
     for name, true in zip(PARAMETERS, slow.as_tuple(), strict=True):
-        own = found.parameters[name]
+        own = seen.parameters_after[name]
         assert abs(own.value - true) < 3.0 * own.std, (name, own, true)
-    assert found.parameters["leakage_inductance_h"].value == pytest.approx(slow.leakage_inductance_h, rel=0.015)
+    assert seen.parameters_after["leakage_inductance_h"].value == pytest.approx(slow.leakage_inductance_h, rel=0.01)
+    (cause,) = seen.causes
+    added, std, _ = cause.sizes["added_at_standstill"]
+    assert std > 0.1 * added, "the form of bars is not known"
 
 
-@pytest.mark.parametrize(
-    ("cause", "least"), [({"iron_conductance": 0.03}, (0.003, 0.0)), ({"bar_resistance": 1.0}, (0.0, 0.01))]
-)
-def test_a_diagnosis_too_has_the_four_of_small_slip_and_their_law_in_the_errors(
-    cause: dict[str, float], least: tuple[float, float]
-) -> None:
-    """It had R_s 1.3 % off an iron loss at the air gap at a stated 0.02 %, L_sigma 7.5 % off deep bars' at 0.02 %."""
-    told = diagnose([started(PLATE, **cause)], PLATE).parameters_after
-    true = _at_small_slip(DEFAULTS["bar_corner"]) if "bar_resistance" in cause else tuple(FOUR.values())
-    for name, value in zip(PARAMETERS, true, strict=True):
-        assert abs(told[name].value - value) < 3.0 * told[name].std
-        assert told[name].value == pytest.approx(value, rel=0.005)
-    for name, share in zip(("stator_resistance_ohm", "leakage_inductance_h"), least, strict=True):
-        assert told[name].std > share * told[name].value
+def test_where_iron_loses_is_in_the_errors_of_a_diagnosis() -> None:
+    """R_s was 0.8 and 1.3 % off a loss at the air gap at a stated 0.02 %."""
+    told = diagnose([started(PLATE, iron_conductance=0.03)], PLATE).parameters_after["stator_resistance_ohm"]
+    assert told.value == pytest.approx(FOUR["stator_resistance"], rel=1e-3)
+    assert told.std > 0.003 * told.value
 
 
 def _at_small_slip(corner: float) -> tuple[float, ...]:
