@@ -480,26 +480,54 @@ class _Sensitivity:
         self._learnt.append((weight, missed))
 
 
+@dataclass(frozen=True)
+class Expected:
+    """What the numbers are before a recording is seen: in fit coordinates, with standard deviations by name, and the chi-square a sample of what the
+    machine cannot follow, which counts as noise beside them."""
+
+    theta: Array
+    stds: Mapping[str, float]
+    scale: float = 1.0
+
+    def rest(self, machine: Machine, columns: Sequence[Column]) -> Array:
+        """Rows that draw the numbers there."""
+        off = [self.theta[c.index] - machine.theta[c.index] if c.kind == "p" else 0.0 for c in columns]
+        return np.asarray(off) * self.weights(columns)
+
+    def weights(self, columns: Sequence[Column]) -> Array:
+        """Of each column's row; none of one that may be anything."""
+        stds = [self.stds.get(NAMES[c.index], np.inf) if c.kind == "p" else np.inf for c in columns]
+        return np.asarray(np.sqrt(self.scale) / np.array(stds))
+
+
 def refine(
     problem: Problem, machine: Machine, columns: Sequence[Column], *, most: int = MOST_STEPS, first_jacobian: Array | None = None,
-    tolerance: float = ENDED, is_final: bool = True,
+    tolerance: float = ENDED, is_final: bool = True, expected: Expected | None = None,
 ) -> Fit:  # fmt: skip
     """Levenberg-Marquardt from `machine`; `first_jacobian` as known from near by.
 
     A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a fortieth of it). `is_final`: end
     with a fresh one.
     """
+
+    def with_expected(rest: Array, machine: Machine) -> Array:
+        return rest if expected is None else np.concatenate([rest, expected.rest(machine, columns)])
+
+    def sensitivity() -> _Sensitivity:
+        own = jacobian(problem, machine, columns)
+        return _Sensitivity(own if expected is None else np.hstack([own, np.diag(expected.weights(columns))]))
+
     parts = residuals(problem, machine)
-    rest = fitted_part(problem, parts)
+    rest = with_expected(fitted_part(problem, parts), machine)
     chi2, damping, is_fresh, before = float(rest @ rest), 0.0, False, np.inf
     known = None if first_jacobian is None else _Sensitivity(first_jacobian)
     for _ in range(most):
         if known is None:
-            known, is_fresh, before = _Sensitivity(jacobian(problem, machine, columns)), True, np.inf
+            known, is_fresh, before = sensitivity(), True, np.inf
         step = known.step(rest, columns, damping)
         trial = machine.moved(columns, step)
         trial_parts = residuals(problem, trial)
-        trial_rest = fitted_part(problem, trial_parts)
+        trial_rest = with_expected(fitted_part(problem, trial_parts), trial)
         gained = chi2 - float(trial_rest @ trial_rest)
         if gained > 0.0:
             known.learn(step, rest - trial_rest)

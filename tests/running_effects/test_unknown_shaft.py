@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from commissioner.estimation import fit
-from commissioner.estimation.fit import Fit, Problem, fitted_part, problem_of, residuals
+from commissioner.estimation.fit import (
+    Expected,
+    Fit,
+    Problem,
+    columns_of,
+    fitted_part,
+    plain_machine,
+    problem_of,
+    refine,
+    residuals,
+)
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.record import STATES, prepare
 from commissioner.records import RunningRecording
@@ -216,3 +226,16 @@ def test_a_start_with_a_bad_contact_does_not_end_astray(monkeypatch: pytest.Monk
     fitted = with_shaft(problem_of(prepare([seen], PLATE), 0.0))
     assert all(fitted.machine.value(name) == pytest.approx(true, rel=0.1) for name, true in FOUR.items())
     assert fitted.machine.value("line_re") == 0.0
+
+
+def test_what_little_of_a_start_leaves_open_stays_near_the_plate() -> None:
+    """A broken cage: 40 ms had a sixth of L_M, from where a heavy motor did not come back."""
+    seen = prepare([_running(0, 1500, inertia=0.3, load_constant=0.3, cage_asymmetry_re=0.2)], PLATE)
+    first = plain_machine(list(FOUR.values()), seen, inertia=0.3, has_shaft=True)
+    part = problem_of(seen, 0.0).cut(0.04)
+    free = refine(part, first, columns_of(tuple(FOUR), seen, first)).machine
+    rest = fitted_part(part, residuals(part, first))
+    near = Expected(first.theta, dict.fromkeys(FOUR, 0.5), scale=float(rest @ rest) / rest.size)
+    held = refine(part, first, columns_of(tuple(FOUR), seen, first), expected=near).machine
+    assert free.value("magnetizing_inductance") < 0.2 * FOUR["magnetizing_inductance"]
+    assert held.value("magnetizing_inductance") > 0.3 * FOUR["magnetizing_inductance"]
