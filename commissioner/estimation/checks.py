@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
-from commissioner.motor.channels.clock import turning_hz, wrong_unit
+from commissioner.motor.channels.clock import turn_a_row, wrong_unit
 from commissioner.motor.channels.faults import no_lines
 from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.records import RunningRecording
@@ -113,32 +113,31 @@ def _block(one: RunningRecording) -> int:
 
 
 def _turn(one: RunningRecording, voltage: Array, scales: Scales) -> tuple[Array, Bools]:
-    """(rad/s by which the voltage turns in blocks of a period, whether it is there in all of a block)."""
+    """(rad/s by which the voltage turns in blocks of a period, its sense with it, and whether it is there in all of a block)."""
     block = _block(one)
     whole = one.time_s.size // block * block
     v = np.nan_to_num(voltage[:whole, 0] + 1j * voltage[:whole, 1]).reshape(-1, block)
-    turn = np.abs(np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1))) / one.sample_period_s
-    return turn, (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & (turn > 0.0)
+    turn = np.angle(np.sum(np.conj(v[:, :-1]) * v[:, 1:], axis=1)) / one.sample_period_s
+    return turn, (np.abs(v).min(axis=1) > OFF_VOLTAGE * scales.voltage_v) & (turn != 0.0)
 
 
 def hz_of_supply(one: RunningRecording, voltage: Array, scales: Scales) -> float:
-    """Of most of the recording; 0 where the motor is not fed, or by a frequency that moves."""
+    """Of most of the recording (its longest stretch in one sense); 0 where the motor is not fed, or by a frequency that moves."""
     turn, is_fed = _turn(one, voltage, scales)
     if not is_fed.any():
         return 0.0
-    least, median, most = np.quantile(turn[is_fed], (0.1, 0.5, 0.9))
+    least, median, most = np.quantile(np.abs(turn[is_fed]), (0.1, 0.5, 0.9))
     if not most - least < STEADY_TURN * median:
         return 0.0
-    at = np.flatnonzero(is_fed)
-    first, last = _longest(at) if at.size else (0, 0)
+    first, last = _longest(np.flatnonzero(is_fed), turn)
     block = _block(one)
     vector = voltage[first * block : last * block] @ np.array([1.0, 1j])
-    return turning_hz(vector, one.sample_period_s, float(median) / (2 * np.pi))
+    return abs(turn_a_row(vector)) / (2 * np.pi * one.sample_period_s)
 
 
-def _longest(at: NDArray[np.int64]) -> tuple[int, int]:
-    """First and last + 1 of the longest run of neighbours."""
-    runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
+def _longest(at: NDArray[np.int64], turn: Array) -> tuple[int, int]:
+    """First and last + 1 of the longest run of neighbours that turn in one sense."""
+    runs = np.split(at, np.flatnonzero((np.diff(at) > 1) | (np.diff(np.sign(turn[at])) != 0.0)) + 1)
     run = max(runs, key=len)
     return int(run[0]), int(run[-1]) + 1
 
@@ -181,7 +180,7 @@ def _check_speed(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     block = _block(one)
     speed = scales.pole_pairs * np.abs(one.speed_rad_per_s[: turn.size * block].reshape(-1, block)).mean(axis=1)
     is_fed &= np.isfinite(speed)
-    ratio = float(np.median(speed[is_fed] / turn[is_fed])) if is_fed.any() else 0.0
+    ratio = float(np.median(speed[is_fed] / np.abs(turn[is_fed]))) if is_fed.any() else 0.0
     if ratio > MOST_OVER_FIELD:
         raise refused(
             f"{one.source}: the shaft would turn {ratio:.3g} times as fast as the field that the voltage makes", ratio, MOST_OVER_FIELD,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.estimation.cancelling import ask_for_time
+from commissioner.estimation.checks import BLOCK_S
 from commissioner.estimation.kernels.march import NO_ROW, STATES, UNSET, Directions, Load, march, tangents
 from commissioner.estimation.kernels.whitening import whiten
 from commissioner.estimation.noise import Noise, plain_noise
@@ -380,6 +381,31 @@ class Fit:
         return float(np.sqrt(self.covariance()[place, place]) * self.machine.slope()[AT[name]])
 
 
+def scattered(problem: Problem, fit: Fit) -> Array:
+    """Covariance of the columns' numbers, never below what the sums of gradient over blocks of 20 ms scatter by, which hold what is left with a
+    structure of its own (cluster-robust: Liang, Zeger 1986, DOI 10.1093/biomet/73.1.13)."""
+    block = max(round(BLOCK_S / problem.period), 1) * (3 if problem.noise.has_zero else 2)
+    sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
+    moves = fit.influence()
+    scatter = np.sum((moves @ sums) ** 2, axis=1)
+    wider = np.sqrt(np.maximum(scatter / np.maximum(fit.scale * moves.diagonal(), 1e-300), 1.0))
+    return np.asarray(fit.covariance() * np.outer(wider, wider))
+
+
+def made_of(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, tuple[float, Array]]:
+    """What is made of the machine's numbers, by name: its value and by how much each column of the fit moves it."""
+    values, slope = fit.machine.values(), fit.machine.slope()
+    known = made(values)
+    gradient = {name: np.zeros(len(fit.columns)) for name in known}
+    for j, number in ((j, NAMES[c.index]) for j, c in enumerate(fit.columns) if c.kind == "p"):
+        h = 1e-5 * max(abs(values[number]), 1e-4)
+        for sign in (1.0, -1.0):
+            moved = made({**values, number: values[number] + sign * h})
+            for name in known:
+                gradient[name][j] += sign * moved.get(name, known[name]) / (2.0 * h) * slope[AT[number]]
+    return {name: (float(x), gradient[name]) for name, x in known.items()}
+
+
 def numbers_of(names: Sequence[str], record: Record) -> tuple[Column, ...]:
     """The named numbers; of those that go with the shaft's angle also what each further window has beside the first, behind all."""
     places = [AT[name] for name in names]
@@ -455,26 +481,54 @@ class _Sensitivity:
         self._learnt.append((weight, missed))
 
 
+@dataclass(frozen=True)
+class Expected:
+    """What the numbers are before a recording is seen: in fit coordinates, with standard deviations by name, and the chi-square a sample of what the
+    machine cannot follow, which counts as noise beside them."""
+
+    theta: Array
+    stds: Mapping[str, float]
+    scale: float = 1.0
+
+    def rest(self, machine: Machine, columns: Sequence[Column]) -> Array:
+        """Rows that draw the numbers there."""
+        off = [self.theta[c.index] - machine.theta[c.index] if c.kind == "p" else 0.0 for c in columns]
+        return np.asarray(off) * self.weights(columns)
+
+    def weights(self, columns: Sequence[Column]) -> Array:
+        """Of each column's row; none of one that may be anything."""
+        stds = [self.stds.get(NAMES[c.index], np.inf) if c.kind == "p" else np.inf for c in columns]
+        return np.asarray(np.sqrt(self.scale) / np.array(stds))
+
+
 def refine(
     problem: Problem, machine: Machine, columns: Sequence[Column], *, most: int = MOST_STEPS, first_jacobian: Array | None = None,
-    tolerance: float = ENDED, is_final: bool = True,
+    tolerance: float = ENDED, is_final: bool = True, expected: Expected | None = None,
 ) -> Fit:  # fmt: skip
     """Levenberg-Marquardt from `machine`; `first_jacobian` as known from near by.
 
     A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a fortieth of it). `is_final`: end
     with a fresh one.
     """
+
+    def with_expected(rest: Array, machine: Machine) -> Array:
+        return rest if expected is None else np.concatenate([rest, expected.rest(machine, columns)])
+
+    def sensitivity() -> _Sensitivity:
+        own = jacobian(problem, machine, columns)
+        return _Sensitivity(own if expected is None else np.hstack([own, np.diag(expected.weights(columns))]))
+
     parts = residuals(problem, machine)
-    rest = fitted_part(problem, parts)
+    rest = with_expected(fitted_part(problem, parts), machine)
     chi2, damping, is_fresh, before = float(rest @ rest), 0.0, False, np.inf
     known = None if first_jacobian is None else _Sensitivity(first_jacobian)
     for _ in range(most):
         if known is None:
-            known, is_fresh, before = _Sensitivity(jacobian(problem, machine, columns)), True, np.inf
+            known, is_fresh, before = sensitivity(), True, np.inf
         step = known.step(rest, columns, damping)
         trial = machine.moved(columns, step)
         trial_parts = residuals(problem, trial)
-        trial_rest = fitted_part(problem, trial_parts)
+        trial_rest = with_expected(fitted_part(problem, trial_parts), trial)
         gained = chi2 - float(trial_rest @ trial_rest)
         if gained > 0.0:
             known.learn(step, rest - trial_rest)

@@ -45,6 +45,16 @@ class InverseGamma:
         """L_M / R_R, equal to L_r / R_r of the T circuit."""
         return self.magnetizing_inductance_h / self.rotor_resistance_ohm
 
+    def with_rotor_leakage(self, leakage_h: float) -> InverseGamma:
+        """The circuit of the same terminals where the rotor branch has so much leakage: g = L_M / (L_M + l) refers the rotor once more."""
+        ratio = self.magnetizing_inductance_h / (self.magnetizing_inductance_h + leakage_h)
+        return InverseGamma(
+            self.stator_resistance_ohm,
+            ratio * ratio * self.rotor_resistance_ohm,
+            self.leakage_inductance_h + ratio * leakage_h,
+            ratio * self.magnetizing_inductance_h,
+        )
+
     def as_tuple(self) -> tuple[float, float, float, float]:
         """(R_s, R_R, L_sigma, L_M)."""
         return (

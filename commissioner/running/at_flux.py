@@ -6,7 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from commissioner.estimation.hidden import at_small_slip
 from commissioner.estimation.record import Record
+from commissioner.motor.channels.clock import turn_a_row
 
 TAIL_S = 0.1
 SIDES = ("stator", "gap", "rotor")
@@ -26,7 +28,7 @@ def _ends_with(record: Record) -> tuple[complex, complex, float]:
     w = record.windows[-1]
     many = min(max(round(TAIL_S / record.period_s), 10), w.count)
     u, i = (x[-many:, 0] + 1j * x[-many:, 1] for x in (w.voltage[::2], w.current))
-    turn = float(np.angle(np.sum(np.conj(u[:-1]) * u[1:])))
+    turn = turn_a_row(u)
     window = np.hanning(many) * np.exp(-1j * turn * np.arange(many))
     return (
         complex(u @ window / np.hanning(many).sum()),
@@ -50,7 +52,8 @@ def at_flux(record: Record, values: Mapping[str, float]) -> dict[str, float]:
     """
     _, current, _ = _ends_with(record)
     stator = stator_flux_wb(record, values)
-    leakage, main = values["leakage_inductance"], values["magnetizing_inductance"]
+    four = at_small_slip(values)
+    leakage, main = four.leakage_inductance_h, four.magnetizing_inductance_h
     split = values["leakage_split"] / (1.0 + values["leakage_split"])
     rated = record.scales.voltage_v / record.scales.frequency_rad_per_s
     share, added = 0.0, 0.0
@@ -61,5 +64,5 @@ def at_flux(record: Record, values: Mapping[str, float]) -> dict[str, float]:
     g = 1.0 / (1.0 + (1.0 - share) * added * leakage / main)
     return {
         "magnetizing_inductance_h": main * g * g / (1.0 + g * added),
-        "rotor_time_constant_s": main / values["rotor_resistance"] / (1.0 + g * added),
+        "rotor_time_constant_s": four.rotor_time_constant_s / (1.0 + g * added),
     }

@@ -9,8 +9,9 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.cancelling import TimeOver
-from commissioner.estimation.fit import Fit, problem_of, simulate
-from commissioner.estimation.numbers import AT, FOUR, NAMES
+from commissioner.estimation.fit import Fit, Problem, made_of, problem_of, scattered, simulate
+from commissioner.estimation.hidden import at_small_slip, by_laws
+from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record, negative_sequence, prepare
 from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
@@ -34,6 +35,10 @@ MOSTLY_GUESSES = 0.8
 """Share of the error below which causes beside something unexplained are not named: whatever bends helps a fit a little."""
 LEAST_ERROR = 0.1
 """Power of the held-out error over the noise's, below which there is nothing to gain there."""
+
+
+Made = Callable[[Mapping[str, float]], Mapping[str, float]]
+"""Of a machine's numbers."""
 
 
 @dataclass(frozen=True)
@@ -152,9 +157,9 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         )
     saturated: Mapping[str, Quantity] = {}
     if is_saturated(found.fit.machine.values()):
-        saturated = _with_errors(found.fit, lambda values: at_flux(record, values))
+        saturated = _with_errors(found.problem, found.fit, lambda values: at_flux(record, values))
     return Diagnosis(
-        verdict, reason, causes, gain, left, _parameters(found.nominal), _with_trifles(found, {**_parameters(found.fit), **saturated}),
+        verdict, reason, causes, gain, left, _parameters(found.problem, found.nominal), _with_trifles(found, {**_parameters(found.problem, found.fit), **saturated}),
         next_experiment(verdict, [(c.name, c.equivalent) for c in causes], record) if found.is_complete else None,
         found, record, tuple(remarks), stator_flux_wb=abs(stator_flux_wb(record, found.fit.machine.values())) if saturated else None,
     )  # fmt: skip
@@ -162,10 +167,10 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
 
 def _with_trifles(found: Found, told: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """The parameters, what is too small to be named and moves them counted as an error of theirs."""
-    values = {name: q.value for name, q in _parameters(found.fit).items()}
+    values = {name: q.value for name, q in _parameters(found.problem, found.fit).items()}
     out = dict(told)
     for trifle in found.trifles:
-        for name, moved in _parameters(trifle.fit).items():
+        for name, moved in _parameters(found.problem, trifle.fit).items():
             if name in out:
                 shift = moved.value - values[name]
                 out[name] = Quantity(out[name].value, max(out[name].std, float(np.hypot(told[name].std, shift))))
@@ -178,9 +183,12 @@ def _of_trifles(found: Found) -> Iterator[str]:
         return
     names = ", ".join(dict.fromkeys(t.cause.cause.replace("_", " ") for t in found.trifles))
     strength = max(np.sqrt(t.gain / t.fit.count) for t in found.trifles)
-    values = {name: q.value for name, q in _parameters(found.fit).items() if q.value}
+    values = {name: q.value for name, q in _parameters(found.problem, found.fit).items() if q.value}
     moved = [
-        (q.value / values[k] - 1.0, k) for t in found.trifles for k, q in _parameters(t.fit).items() if k in values
+        (q.value / values[k] - 1.0, k)
+        for t in found.trifles
+        for k, q in _parameters(found.problem, t.fit).items()
+        if k in values
     ]
     share, most = max(moved, key=lambda one: abs(one[0]))
     yield (
@@ -193,11 +201,8 @@ def _left_open(found: Found) -> Iterator[str]:
     """What a named cause leaves open of all parameters."""
     values = dict(zip(NAMES, found.fit.machine.physical(), strict=True))
     for one in found.accepted:
-        if share := CATALOGUE[one.cause].common(values):
-            yield (
-                f"Which of the gains is right is not in the data: if one channel alone is wrong, resistances and inductances are off by "
-                f"{share:.2%} of their values, beside their intervals."
-            )
+        if said := CATALOGUE[one.cause].leaves_open(values):
+            yield said
 
 
 def _gain(found: Found) -> Gain:
@@ -249,26 +254,21 @@ def _sizes(found: Found, one: Named, cause: Cause) -> dict[str, tuple[float, flo
     scales = found.problem.record.scales
     units = {name: unit for name, (_, unit) in cause.sizes(found.fit.machine.values(), scales).items()}
     told = _with_errors(
-        found.fit, lambda values: {name: size for name, (size, _) in cause.sizes(values, scales).items()}
-    )
+        found.problem, found.fit, lambda values: {name: size for name, (size, _) in cause.sizes(values, scales).items()},
+        is_by_law=cause.is_sized_by_law(found.problem.record),
+    )  # fmt: skip
     return {name: (q.value, q.std, units[name]) for name, q in told.items()}
 
 
-def _with_errors(fit: Fit, made: Callable[[Mapping[str, float]], Mapping[str, float]]) -> dict[str, Quantity]:
-    """What is made of the machine's numbers, with standard deviations from the covariance of all that was free."""
-    values, slope, covariance = fit.machine.values(), fit.machine.slope(), fit.covariance()
-    known = made(values)
-    gradient = {name: np.zeros(len(fit.columns)) for name in known}
-    for j, number in ((j, NAMES[c.index]) for j, c in enumerate(fit.columns) if c.kind == "p"):
-        h = 1e-5 * max(abs(values[number]), 1e-4)
-        for sign in (1.0, -1.0):
-            moved = made({**values, number: values[number] + sign * h})
-            for name in known:
-                gradient[name][j] += sign * moved.get(name, known[name]) / (2.0 * h) * slope[AT[number]]
-    return {
-        name: Quantity(float(x), float(np.sqrt(max(float(gradient[name] @ covariance @ gradient[name]), 0.0))))
-        for name, x in known.items()
-    }
+def _with_errors(problem: Problem, fit: Fit, made: Made, *, is_by_law: bool = True) -> dict[str, Quantity]:
+    """What is made of the machine's numbers, with standard deviations from the covariance of all that was free; `is_by_law`: with what
+    nobody knows of where iron loses and what form bars have."""
+    covariance, told = scattered(problem, fit), made_of(fit, made)
+    moves = np.array([moved for _, moved in told.values()])
+    variance = np.maximum(np.einsum("ij,jk,ik->i", moves, covariance, moves), 0.0)
+    if is_by_law:
+        variance = variance + np.sum(by_laws(fit, moves) ** 2, axis=0)
+    return {name: Quantity(told[name][0], float(std)) for name, std in zip(told, np.sqrt(variance), strict=True)}
 
 
 def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[DiagnosisVerdict, str]:
@@ -305,14 +305,13 @@ def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Diag
     return "explained", "The named causes leave nothing above the noise."
 
 
-def _parameters(fit: Fit) -> dict[str, Quantity]:
-    out = {}
-    for name, key in zip(FOUR, PARAMETERS, strict=True):
-        out[key] = Quantity(fit.machine.value(name), fit.std(name))
-    time_constant = fit.machine.value("magnetizing_inductance") / fit.machine.value("rotor_resistance")
-    covariance = fit.covariance()
-    spread = covariance[3, 3] + covariance[1, 1] - 2.0 * covariance[1, 3]
-    out["rotor_time_constant_s"] = Quantity(time_constant, float(time_constant * np.sqrt(max(spread, 0.0))))
+def _parameters(problem: Problem, fit: Fit) -> dict[str, Quantity]:
+    out = _with_errors(problem, fit, _four)
     if fit.machine.has_shaft and any(c.kind == "p" and c.index == AT["inertia"] for c in fit.columns):
         out["inertia_kg_m2"] = Quantity(fit.machine.value("inertia"), fit.std("inertia"))
     return out
+
+
+def _four(values: Mapping[str, float]) -> dict[str, float]:
+    four = at_small_slip(values)
+    return {**dict(zip(PARAMETERS, four.as_tuple(), strict=True)), "rotor_time_constant_s": four.rotor_time_constant_s}

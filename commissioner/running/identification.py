@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.checks import BLOCK_S
 from commissioner.estimation.fit import (
     INERTIA,
     Column,
@@ -22,17 +21,20 @@ from commissioner.estimation.fit import (
     Machine,
     Problem,
     jacobian,
+    made_of,
     problem_of,
     refine,
+    scattered,
     simulate,
 )
 from commissioner.estimation.held import best_reading
-from commissioner.estimation.hidden import by_laws, drawn_aside, told_in, with_told
+from commissioner.estimation.hidden import at_small_slip, by_laws, drawn_aside, told_in, with_told
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import STATES, Record, first_part, prepare, scales_of
 from commissioner.identify.contract import Measured, RunningDocument
+from commissioner.motor.channels.clock import turn_a_row
 from commissioner.motor.channels.faults import currents_on_time
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
@@ -99,10 +101,11 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     fit = with_told(problem, fit)
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
-    noise_only = _of_four(fit, fit.covariance())
+    moves = _moves(fit)
+    noise_only = moves @ fit.covariance() @ moves.T
     whole = _covariance(problem, fit)
-    beside = np.vstack([by_lag, by_laws(fit)])  # a filter or a counter, where iron acts: not known
-    covariance = _of_four(fit, whole) + beside.T @ beside
+    beside = np.vstack([by_lag, by_laws(fit, moves)])  # a filter or a counter, where iron acts: not known
+    covariance = moves @ whole @ moves.T + beside.T @ beside
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
         raise record.refusal_of_standing("identify") or DataRefused(
@@ -110,10 +113,10 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
             limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque; one steady load is for `commissioner monitor`",
         )  # fmt: skip
     aside = drawn_aside(problem, fit)
-    whole, covariance = whole + aside.T @ aside, covariance + _of_four(fit, aside.T @ aside)
+    whole, covariance = whole + aside.T @ aside, covariance + moves @ aside.T @ aside @ moves.T
     left = lack_of_fit(problem, fit.machine)
     inertia, load = _shaft(problem, fit, covariance, _inertia_of(fit, whole))
-    four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
+    four = at_small_slip(fit.machine.values())
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
     bound = {name: quantity.std for name, quantity in _parameters(four, noise_only / fit.scale).items()}
     return Identified(
@@ -165,16 +168,9 @@ def _earlier(problem: Problem, late_s: float) -> Problem:
 
 
 def _covariance(problem: Problem, fit: Fit) -> Array:
-    """Of the columns' numbers: never below what the sums of gradient over blocks of 20 ms scatter by, which hold what is left with a
-    structure of its own (cluster-robust: Liang, Zeger 1986, DOI 10.1093/biomet/73.1.13)."""
-    covariance = fit.covariance()
-    block = max(round(BLOCK_S / problem.period), 1) * (3 if problem.noise.has_zero else 2)
-    sums = np.add.reduceat(fit.jacobian * fit.rest, np.arange(0, fit.count, block), axis=1)
-    moves = fit.influence()
-    scatter = np.sum((moves @ sums) ** 2, axis=1)
-    wider = np.sqrt(np.maximum(scatter / np.maximum(fit.scale * moves.diagonal(), 1e-300), 1.0))
+    """Of the columns' numbers, with what is left and an inertia that is assumed."""
     aside = _by_inertia(problem, fit)
-    return np.asarray(covariance * np.outer(wider, wider) + np.outer(aside, aside))
+    return np.asarray(scattered(problem, fit) + np.outer(aside, aside))
 
 
 def _by_inertia(problem: Problem, fit: Fit) -> Array:
@@ -185,10 +181,10 @@ def _by_inertia(problem: Problem, fit: Fit) -> Array:
     return np.asarray(OF_ASSUMED_INERTIA * fit.influence() @ (fit.jacobian @ along))
 
 
-def _of_four(fit: Fit, covariance: Array) -> Array:
-    """That of the logarithms of R_s, R_R, L_sigma, L_M."""
-    own = [next(j for j, c in enumerate(fit.columns) if c.kind == "p" and c.index == AT[n]) for n in FOUR]
-    return covariance[np.ix_(own, own)]
+def _moves(fit: Fit) -> Array:
+    """(four, columns): by how much each column moves the logarithms of R_s, R_R, L_sigma, L_M at small slip."""
+    told = made_of(fit, lambda values: dict(zip(FOUR, np.log(at_small_slip(values).as_tuple()).tolist(), strict=True)))
+    return np.array([told[name][1] for name in FOUR])
 
 
 def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
@@ -295,8 +291,7 @@ def _flux(record: Record) -> float:
     w = record.windows[-1]
     u = w.voltage[::2, 0] + 1j * w.voltage[::2, 1]
     tail = u[-max(round(0.1 / record.period_s), 10) :]
-    turn = float(np.abs(np.angle(np.sum(np.conj(tail[:-1]) * tail[1:])))) / record.period_s
-    return float(np.median(np.abs(tail)) / max(turn, 1e-9))
+    return float(np.median(np.abs(tail)) / max(abs(turn_a_row(tail)) / record.period_s, 1e-9))
 
 
 def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | None, fit: Fit) -> tuple[str, ...]:

@@ -30,4 +30,4 @@ def test_a_healthy_motor_has_none():
     recording, plate, _ = taken(draw(3, "null", "steady"), 3)
     seen = diagnose([recording], plate)
     assert not seen.found.trifles and as_document(seen)["below_materiality"] == []
-    assert seen.parameters_after[R_S].std == seen.found.fit.std("stator_resistance")
+    assert seen.parameters_after[R_S].std == pytest.approx(seen.found.fit.std("stator_resistance"))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.motor.channels.clock import turning_hz
+from commissioner.motor.channels.clock import turn_a_row
 from commissioner.motor.computed import is_negative_sum
 from commissioner.records import Signal
 
@@ -86,7 +86,9 @@ def supply_hz(vector: NDArray[np.complex128], period_s: float) -> float:
     if turns.size == 0 or np.ptp(turns) > TURNS_ALIKE * turns.max():
         return 0.0
     turn = abs(float(np.angle(np.sum(swept)))) / (2.0 * np.pi * period_s)
-    return turning_hz(there, period_s, turn) if turn * period_s * there.size > PERIODS * LEAST_WINDOWS else 0.0
+    if turn * period_s * there.size <= PERIODS * LEAST_WINDOWS:
+        return 0.0
+    return abs(turn_a_row(there)) / (2.0 * np.pi * period_s)
 
 
 def _means(group: Sequence[Signal], time_s: Signal, hz: float) -> tuple[Array, Array, float] | None:

@@ -44,10 +44,11 @@ class Confounder:
 class Cause:
     """`says` has a `{size}`. `range`: of the first size, what physics allows; outside it is another cause in disguise.
 
-    `allows`: what else physics demands of its numbers. `common`: what share of themselves all resistances and inductances are off by
-    if one channel alone is wrong, for which one the data do not tell. `scenario`: entry of [effects] in the simulator; derivatives are those of
-    the kernel's lines, exact by complex step. `goes_by`: whose its numbers may be in this
-    recording, the likeliest first, where not its own alone; `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
+    `allows`: what else physics demands of its numbers. `leaves_open`: a sentence on what no data tell of the parameters beside it, the channel
+    or the line that differs from the mean being one alone. `is_sized_by_law`: whether a recording tells its sizes by the form of its law, which
+    is not known, so that they have what `by_laws` says in their errors. `scenario`: entry of [effects] in the simulator; derivatives are those of
+    the kernel's lines, exact by complex step. `goes_by`: whose its numbers may be in this recording, the likeliest first, where not its own alone;
+    `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
     """
 
     name: str
@@ -66,8 +67,9 @@ class Cause:
     needs: Callable[[Record], bool] = field(default=lambda _: True)
     is_of_measurement: bool = False
     allows: Callable[[Values, Scales], bool] = field(default=lambda _, __: True)
-    common: Callable[[Values], float] = field(default=lambda _: 0.0)
     goes_by: Callable[[Record, Values], tuple[str, ...]] = field(default=lambda _, __: ())
+    leaves_open: Callable[[Values], str] = field(default=lambda _: "")
+    is_sized_by_law: Callable[[Record], bool] = field(default=lambda _: False)
     negative_sequence: Literal["", "adds", "impedes"] = ""
 
     def size(self, values: Values, scales: Scales) -> float:
@@ -82,6 +84,14 @@ class Cause:
         """Whether the first size lies in the range physics allows."""
         size = self.size(values, scales)
         return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values, scales))
+
+
+def of_one_gain(share: float) -> str:
+    """What a gain of one channel leaves open."""
+    return (
+        "Which of the gains is right is not in the data: if one channel alone is wrong, resistances and inductances are off by "
+        f"{share:.2%} of their values, beside their intervals."
+    )
 
 
 def in_phases(re: float, im: float) -> tuple[float, float, float]:

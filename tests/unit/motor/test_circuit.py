@@ -78,3 +78,15 @@ def test_standard_errors_of_the_t_model_agree_with_scattered_machines():
     ]
     stated = to_t_model(machine, np.diag(std**2)).rotor_resistance_ohm.std
     assert stated == pytest.approx(np.std(scattered), rel=4 / np.sqrt(4000))
+
+
+@pytest.mark.parametrize("slip_hz", [0.3, 3.0, 50.0])
+def test_a_leakage_in_the_rotor_branch_is_the_same_circuit_without_it(slip_hz):
+    """At the terminals, supply of 50 Hz."""
+    w, slip, plain, leakage = 100.0 * np.pi, slip_hz / 50.0, InverseGamma(1.3, 1.0, 0.012, 0.17), 0.009
+
+    def seen(four, in_rotor):
+        rotor, main = four.rotor_resistance_ohm / slip + 1j * w * in_rotor, 1j * w * four.magnetizing_inductance_h
+        return four.stator_resistance_ohm + 1j * w * four.leakage_inductance_h + rotor * main / (rotor + main)
+
+    assert seen(plain.with_rotor_leakage(leakage), 0.0) == pytest.approx(seen(plain, leakage), rel=1e-12)

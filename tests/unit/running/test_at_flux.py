@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from commissioner.estimation.numbers import NAMES, Scales
+from commissioner.estimation.numbers import DEFAULTS, NAMES, Scales
 from commissioner.running.at_flux import at_flux, stator_flux_wb
 
 PERIOD, W, SLIP_W = 2e-4, 314.0, 9.0
@@ -38,7 +38,7 @@ def test_the_linear_machine_at_this_flux_draws_the_same_current(side: str, share
         count=600,
     )
     record = SimpleNamespace(windows=[window], period_s=PERIOD, scales=SCALES)
-    values = dict.fromkeys(NAMES, 0.0) | {
+    values = dict.fromkeys(NAMES, 0.0) | DEFAULTS | {
         "stator_resistance": R_S, "rotor_resistance": R_R, "leakage_inductance": L_SIGMA, "magnetizing_inductance": L_M,
         "leakage_split": split, **{f"{side}_saturation_{n}": x for n, x in enumerate(LAW, 1)},
     }  # fmt: skip

@@ -83,3 +83,11 @@ def test_a_loop_lags_as_far_as_the_whole_winding_would(resistance, is_one):
     values = zeros() | {"stator_resistance": resistance, "leakage_inductance": 2.9e-3}
     values |= {"loop_conductance_u": 0.07, "loop_susceptance_u": 0.177}
     assert CATALOGUE["stator_asymmetry"].is_plausible(values, SCALES) is is_one
+
+
+def test_r_s_holds_a_third_of_what_one_line_has_more():
+    """0.25 ohm in one line of three of 1.154: R_s of 1.237 stood there at a stated 0.02 %, and not a word."""
+    values = zeros(stator_resistance=1.2373, line_re=0.25 / 1.2373 / 3.0)
+    assert CATALOGUE["line_resistance"].size(values, SCALES) == pytest.approx(0.25)
+    assert "each has 1.154 ohm" in CATALOGUE["line_resistance"].leaves_open(values)
+    assert "off by 0.20%" in CATALOGUE["voltage_gain_mismatch"].leaves_open(zeros(voltage_gain_re=-0.002))

@@ -23,6 +23,7 @@ CAUSE = Cause(
     forms=(Form("", ("iron_conductance",)),),
     sizes=_sizes,
     range=(0.0, 1e7),
+    is_sized_by_law=lambda record: not record.has_speed,  # what it takes is load then
     confounders=(
         Confounder(
             "speed_sensor_gain", "count an encoder's pulses over a known number of turns, or read the shaft's power"

@@ -33,5 +33,6 @@ CAUSE = Cause(
         Confounder("iron_loss", "a start from the mains with the speed recorded"),
     ),
     negative_sequence="impedes",
+    is_sized_by_law=lambda _: True,
     scenario=lambda v, _: {"size": v["bar_resistance"]},
 )

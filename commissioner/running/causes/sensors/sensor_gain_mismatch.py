@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from commissioner.estimation.numbers import Scales
 from commissioner.estimation.record import Record
-from commissioner.running.causes.cause import PHASES, Cause, Confounder, Form, Sizes, Values, one_of_three
+from commissioner.running.causes.cause import PHASES, Cause, Confounder, Form, Sizes, Values, of_one_gain, one_of_three
 
 
 def _parts(v: Values) -> tuple[float, float, float]:
@@ -42,11 +42,11 @@ def _sizes(v: Values, _: Scales) -> Sizes:
     return {f"{PHASES[k]}_against_the_others": (apart, "")}
 
 
-def _common(v: Values) -> float:
+def _leaves_open(v: Values) -> str:
     """The mean of two gains, or of three, whose sum is taken as zero."""
     if without := _computed(v):
-        return abs(v[f"current_pair_{without}"]) / 2.0
-    return abs(one_of_three(_parts(v))[1]) / 3.0
+        return of_one_gain(abs(v[f"current_pair_{without}"]) / 2.0)
+    return of_one_gain(abs(one_of_three(_parts(v))[1]) / 3.0)
 
 
 def _scenario(v: Values, _: Scales) -> dict[str, float]:
@@ -74,5 +74,5 @@ CAUSE = Cause(
     confounders=(Confounder("voltage_gain_mismatch", "the third current sensor, or a start and load steps"),),
     scenario=_scenario,
     is_of_measurement=True,
-    common=_common,
+    leaves_open=_leaves_open,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from commissioner.estimation.numbers import Scales
-from commissioner.running.causes.cause import PHASES, Cause, Form, Sizes, Values, in_phases, one_of_three
+from commissioner.running.causes.cause import PHASES, Cause, Form, Sizes, Values, in_phases, of_one_gain, one_of_three
 
 
 def _apart(v: Values) -> tuple[int, float]:
@@ -31,5 +31,5 @@ CAUSE = Cause(
     negative_sequence="adds",
     scenario=lambda v, s: {"size": _apart(v)[1], "phase": _apart(v)[0]},
     is_of_measurement=True,
-    common=lambda v: abs(_apart(v)[1]) / 3.0,
+    leaves_open=lambda v: of_one_gain(abs(_apart(v)[1]) / 3.0),
 )

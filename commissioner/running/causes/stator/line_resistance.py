@@ -17,6 +17,14 @@ def _scenario(v: Values, s: Scales) -> dict[str, float]:
     return {"size": apart, "phase": k}
 
 
+def _leaves_open(v: Values) -> str:
+    """R_s is the mean of three lines, what one has more counted in."""
+    winding = v["stator_resistance"] * (1.0 + min(in_phases(v["line_re"], v["line_im"])))
+    return (
+        f"R_s is the mean of the three lines with what is unlike in them: of like windings each has {winding:.4g} ohm."
+    )
+
+
 CAUSE = Cause(
     name="line_resistance",
     title="Resistance in one line",
@@ -31,5 +39,6 @@ CAUSE = Cause(
     range=(-100.0, 1e4),
     confounders=(Confounder("voltage_gain_mismatch", "a start; or two loads", tied_without="a second load"),),
     negative_sequence="adds",
+    leaves_open=_leaves_open,
     scenario=_scenario,
 )
