@@ -43,7 +43,8 @@ class Mastery:
                 step="take the drive", value=f"claim 0x{claimed.token:08X} of {claimed.name!r}", limit="one master for one drive",
                 remedy=f"wait until that run has ended; without a sign of life its claim ends in {claimed.left_s} s",
             )  # fmt: skip
-        if local is not None and is_alive:
+        is_ours = local == self._lock.holder  # not claimed yet: the token of a record that is gone, drawn once more
+        if local is not None and is_alive and not is_ours:
             raise in_use(local, self._lock.holder.drive)
         return True
 
