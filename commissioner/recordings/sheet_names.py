@@ -57,6 +57,7 @@ SHEET_RESISTANCE = {
     "winding_resistance_phase_ohm": re.compile(
         rf"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand){_PER_PHASE}"
         rf"|(?:resistance|widerstand)(?:winding{_PER_PHASE}|{_PER_PHASE}winding|(?:per|je|pro)(?:winding|wicklung|strang))"
+        rf"|{_OF_WINDING}(?:between)?(?:terminals)?(?:u1u2|v1v2|w1w2)"
     ),
     "winding_resistance_ohm": re.compile(r"windings?resistance|resistanceof(?:the)?windings?|wicklungswiderstand"),
     "phase_resistance_ohm": re.compile(r"phases?(?:resistance|nwiderstand)|rph(?:ase)?|resistanceperphase"),
@@ -64,7 +65,11 @@ SHEET_RESISTANCE = {
     "resistance_ohm": re.compile(r"resistance|widerstand"),
 }
 """Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
-_TERMINALS = re.compile(rf"{_OF_WINDING}(?:between)?(?:terminals)?l?([abcuvwrst123])l?([abcuvwrst123])")
+_TERMINALS = re.compile(
+    rf"{_OF_WINDING}(?:between)?(?:terminals)?(?:l?([abcuvwrst123])l?([abcuvwrst123])|([uvw])1([uvw])1|t([123])t([123]))"
+)
+"""Also as the terminals are marked (IEC 60034-8 `U1-V1`, NEMA MG 1 `T1-T2`); `U1-U2` are the two ends of one winding."""
+_PAIR_IN_BRACKETS = re.compile(r"[(\[]\s*([A-Z]?[A-Z0-9]\s*[-/\u2013]\s*[A-Z]?[A-Z0-9])\s*[)\]]", re.IGNORECASE)
 _BETWEEN = frozenset(f"winding_resistance_{pair}_ohm" for pair in ("uv", "vw", "wu"))
 _TERMINALS_SAID = re.compile(
     r"[(\[]\s*(?:(?:measured|gemessen)?\s*(?:between|at|zwischen|an)?\s*(?:two|zwei|2)?\s*(?:terminals?|klemmen)|line[ -]?to[ -]?line)\s*[)\]]",
@@ -73,7 +78,9 @@ _TERMINALS_SAID = re.compile(
 """In brackets behind a resistance's name: `Rs (between terminals)`."""
 _SYMBOL_BEHIND = re.compile(r"(.*(?:resistance|widerstand))[\s,(]+(R[ _-]?[A-Za-z0-9-]{0,5})\)?", re.IGNORECASE)
 """A symbol behind words of the same: `Stator resistance Rs`, `Winding resistance R_UV`."""
-_WINDING = re.compile(rf"{_OF_WINDING}(?:(?:of)?(?:phase|winding|strang)l?([123uvwabcrst])|l([123])|([uvwabcrst]))")
+_WINDING = re.compile(
+    rf"{_OF_WINDING}(?:(?:of)?(?:phase|winding|strang)l?([123uvwabcrst])|l([123])|(?P<ends>[uvw])1(?P=ends)2|([uvwabcrst]))"
+)
 """One of the three windings, by its phase; a bare number (`R1`) may be a measurement's, or the stator's beside the rotor's."""
 _OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
 _WATT_METER = re.compile(
@@ -152,6 +159,7 @@ def resistance_meaning(name: str, with_s: bool = False) -> str | None:
 
 def _first(name: str, told: Callable[[str], str | None]) -> str | None:
     """What the first reading of a name, without its unit, tells."""
+    name = _PAIR_IN_BRACKETS.sub(r" \1", name)
     bare = _OHM_ENDING.sub("", IN_NAME.sub("", name).strip())
     spelt = (*readings(bare), *readings(name))  # the V of `R_V` is a phase
     return next((found for reading in spelt if (found := told(key_of(reading)))), None)
@@ -159,13 +167,14 @@ def _first(name: str, told: Callable[[str], str | None]) -> str | None:
 
 def _of_one_winding(key: str) -> str | None:
     found = _WINDING.fullmatch(key)
-    return PHASES[found[1] or found[2] or found[3]] if found else None
+    return PHASES[next(filter(None, found.groups()))] if found else None
 
 
 def _of_resistance(key: str) -> str | None:
-    ends = _TERMINALS.fullmatch(key)
-    if ends and ends[1] != ends[2] and any(ends[1] in letters and ends[2] in letters for letters in ALPHABETS):
-        pair = {PHASES[ends[1]], PHASES[ends[2]]}
+    found = _TERMINALS.fullmatch(key)
+    ends = [end for end in found.groups() if end] if found else []
+    if len({*ends}) > 1 and any({*ends} <= {*letters} for letters in ALPHABETS):
+        pair = {PHASES[end] for end in ends}
         return f"winding_resistance_{next(p for p in ('uv', 'vw', 'wu') if set(p) == pair)}_ohm"
     return next((column for column, names in SHEET_RESISTANCE.items() if names.fullmatch(key)), None)
 

@@ -269,10 +269,14 @@ def _choose(
     options: list[Option], of_plate: list[Option], expected_deg: float, tolerance_deg: float, named: Order
 ) -> tuple[Option | None, Option | None]:
     """(the simplest plausible assignment, that of a generator which is no greater mistake). A motor goes before a generator where the
-    plate allows both, or both are miswired. Currents of foreign size say nothing of the lag, so any is plausible then: it is their scale that is refused."""
+    plate allows both, or both are miswired. Currents of foreign size say nothing of the lag, so any is plausible then: it is their scale that is refused.
+    So it is where no motor, or only a miswired generator, is of this size and the channels as named make a motor: half of an overload's current is that of an
+    idling machine."""
     motors = [o for o in options if 0.0 < o[2] < 90.0 and abs(o[2] - expected_deg) < tolerance_deg]
     motor = min(motors, key=lambda o: (_mistakes(o, named), abs(o[2] - expected_deg)), default=None)
     generator = min((o for o in of_plate if 90.0 <= o[2] < 180.0), key=lambda o: _mistakes(o, named), default=None)
+    if motor is None and (generator is None or _mistakes(generator, named) > 0):
+        motor = next((o for o in options if 0.0 < o[2] < 90.0 and _mistakes(o, named) == 0), None)
     if generator is None or (motor is not None and _mistakes(motor, named) < _mistakes(generator, named)):
         return motor, None
     is_motor = motor is not None and (any(o in of_plate for o in motors) or _mistakes(generator, named) > 0)

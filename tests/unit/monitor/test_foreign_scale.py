@@ -37,6 +37,14 @@ def test_straight_columns_are_straight_at_any_scale(scale: float, load: float) -
     assert found.findings == () and found.current_order == (0, 1, 2)
 
 
+@pytest.mark.parametrize(("scale", "load"), [(1 / 3, 1.2), (0.4, 1.4), (0.5, 1.2)])
+def test_a_part_of_an_overloads_current_is_no_crossed_generators(scale: float, load: float) -> None:
+    """As large as an idling machine's, it had been taken as of three inverted and crossed channels: -1.7 N m where 18.3 were, without a doubt."""
+    found = paired(scale, load)
+    assert found.current_order == (0, 1, 2) and found.current_sign == (1, 1, 1)
+    assert "crossed_channels" not in {f.code for f in found.findings} and not found.is_refused
+
+
 @pytest.mark.parametrize("load", [0.8, 1.2])
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
 def test_crossed_columns_are_crossed_at_any_scale(scale: float, load: float) -> None:
