@@ -72,20 +72,14 @@ class Stream:
             age_s = self._age_s(block)
         return replace(block, age_s=age_s)
 
-    def supervise(self) -> DriveStatus:
-        """As `ask_status`, where nobody reads samples: how many there are tells how fast the drive's time passes."""
-        status = self.ask_status()
-        if status.is_energised and status.samples_produced > 0:
-            self._pin(Counted(status.samples_produced, self._asked_s, self._inverter.now_s()))
-        return status
-
     def ask_status(self) -> DriveStatus:
-        """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
+        """Judge the drive's status, and take from it how many samples there are, which tells how fast the drive's time passes also where
+        every window is full or nobody reads any, and how large the newest is."""
         self._asked_s = self._inverter.now_s()
         status = self._inverter.read_status()
         stop_if(judge_status(status, self._watch))
-        if status.samples_produced > 0:
-            self._clock = self._clock.at_most(status.samples_produced, self._asked_s)
+        if status.is_energised and status.samples_produced > 0:
+            self._pin(Counted(status.samples_produced, self._asked_s, self._inverter.now_s()))
         self.sensors.claim(status)
         return status
 
@@ -140,7 +134,7 @@ class Stream:
         stream = self._cursor.stream
         if stream.averaged == 1 or self.is_over:
             return None
-        there = (now_s - self._clock.began_after_s) / stream.sample_period_s - self._cursor.next_index
+        there = self._clock.most_made(now_s) - self._cursor.next_index
         return min(stream.samples_per_window, math.ceil(ROOM * max(there, 0.0)) + 2)
 
     def _age_s(self, block: SampleBlock) -> float:

@@ -7,6 +7,7 @@ and counts the samples that are missing there as lost.
 from __future__ import annotations
 
 import errno
+import math
 import os
 import struct
 import zlib
@@ -29,8 +30,8 @@ _AGE, _AVERAGED = struct.Struct("<d"), struct.Struct("<H")  # behind the signals
 _UNITS = struct.Struct("<dd")  # before the signals, where these are whole numbers of the drive's counts
 _CLIPPED, _HAS_W, _HAS_AGE, _IS_AVERAGED, _IN_COUNTS = 1, 2, 4, 8, 16
 _FLAGS_AT = _HEADER.size - 1
-LARGEST_BLOCK = 1 << 20
-"""Payload bytes, unpacked; the largest window of a drive makes 4 kB."""
+LARGEST_BLOCK = 1 << 16
+"""Payload bytes, unpacked; eight of a drive's largest windows make 8 kB. Each false mark costs the check sum of so many."""
 
 COUNTS = np.iinfo(np.int16)
 
@@ -149,12 +150,17 @@ def _payload(data: bytes, at: int) -> tuple[bytes, int] | None:
 
 
 def _unpacked(payload: bytes) -> bytes:
-    """DataRefused: a frame whose check sum is right holds what is none of ours."""
+    """DataRefused: a frame whose check sum is right holds what is none of ours, or more than a block."""
     unpacking = zlib.decompressobj(-zlib.MAX_WBITS)
     try:
-        return unpacking.decompress(payload, LARGEST_BLOCK)
+        unpacked = unpacking.decompress(payload, LARGEST_BLOCK)
     except zlib.error as error:
         raise _no_block(len(payload), f"a deflated block ({error})") from error
+    if not unpacking.eof or unpacking.unused_data:
+        raise _no_block(
+            len(payload), f"one whole deflated block of at most {LARGEST_BLOCK} bytes, and nothing behind it"
+        )
+    return unpacked
 
 
 def _encode(block: SampleBlock, segment: int) -> bytes:
@@ -210,14 +216,16 @@ def _decode(payload: bytes) -> Placed:
         channels, count
     )
     unit_v, unit_a = _UNITS.unpack_from(payload, _HEADER.size) if in_counts else (0.0, 0.0)
+    averaged = _AVERAGED.unpack_from(payload, averaged_at)[0] if is_averaged else 1
+    age_s = _AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0
+    if not (averaged and 0.0 < period < math.inf and all(map(math.isfinite, (axis, link, age_s, unit_v, unit_a)))):
+        raise _no_block(len(payload), "a period above zero, and finite numbers")
     signals = numbers * _units(channels, unit_v, unit_a) if in_counts else numbers.astype(np.float64)
     return segment, SampleBlock(
         session=session, first_index=first, sample_period_s=period, axis_deg=axis, voltage_axis_v=signals[0],
         current_u_a=signals[1], current_v_a=signals[2], current_w_a=signals[3] if flags & _HAS_W else None,
         dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
-        age_s=_AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0,
-        averaged=_AVERAGED.unpack_from(payload, averaged_at)[0] if is_averaged else 1,
-        unit_v=unit_v, unit_a=unit_a,
+        age_s=age_s, averaged=averaged, unit_v=unit_v, unit_a=unit_a,
     )  # fmt: skip
 
 

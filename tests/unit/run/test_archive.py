@@ -1,6 +1,7 @@
 """The run folder loses nothing that was written and shows where a kill tore the rest."""
 
 import json
+import math
 import os
 import platform
 import re
@@ -26,8 +27,8 @@ from commissioner.procedure.steps import Findings
 from commissioner.recordings.table import read_table, to_standstill, write_table
 from commissioner.records import SampleBlock
 from commissioner.report.run.standing import Standing
-from commissioner.run.archive import report
-from commissioner.run.archive.blocks import follow_blocks, read_blocks
+from commissioner.run.archive import blocks, report
+from commissioner.run.archive.blocks import follow_blocks, frame, read_blocks
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder, write_recording
 from commissioner.run.archive.follow import JournalFollower
@@ -126,6 +127,42 @@ def test_a_frame_that_is_whole_and_deflates_nothing_is_refused(folder):
     (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLKZ", len(rest), zlib.crc32(rest)) + rest)
     with pytest.raises(DataRefused, match="not this program's"):
         list(read_blocks(folder.path / "blocks.bin"))
+
+
+@pytest.mark.parametrize("tail", [b"behind it", zlib.compress(bytes(2 << 20), wbits=-15)[:2000]])
+def test_what_stands_behind_a_deflated_block_or_swells_it_is_refused(folder, tail):
+    whole = frame(replace(_block(0), **_counted(0), unit_v=0.02, unit_a=1e-3), 0)[12:]
+    for rest in (whole + tail, whole[:-1], zlib.compress(bytes(900 << 10), wbits=-15)):
+        (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLKZ", len(rest), zlib.crc32(rest)) + rest)
+        with pytest.raises(DataRefused, match="not this program's"):
+            list(read_blocks(folder.path / "blocks.bin"))
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [{"sample_period_s": 0.0}, {"sample_period_s": math.nan}, {"sample_period_s": -1.0}, {"axis_deg": math.inf}, {"dc_link_v": math.nan}],
+)  # fmt: skip
+def test_a_whole_block_of_no_time_or_place_is_refused(folder, broken):
+    """An export divided by it."""
+    folder.append(replace(_block(0), **broken), 0)
+    with pytest.raises(DataRefused, match="not this program's"):
+        list(read_blocks(folder.path / "blocks.bin"))
+
+
+def test_a_mean_over_no_control_period_is_refused(folder):
+    payload = frame(replace(_block(0), averaged=7), 0)[12:-2] + bytes(2)
+    (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLK1", len(payload), zlib.crc32(payload)) + payload)
+    with pytest.raises(DataRefused, match="not this program's"):
+        list(read_blocks(folder.path / "blocks.bin"))
+
+
+def test_a_mark_that_claims_more_than_any_block_has_costs_no_check_sum(folder, monkeypatch):
+    """Each of so many false marks was summed over a megabyte: 3 MB of them took two minutes."""
+    summed = []
+    monkeypatch.setattr(blocks.zlib, "crc32", lambda data: summed.append(len(data)) or 0)
+    (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLK1", 900_000, 7) * 90_000)
+    assert list(read_blocks(folder.path / "blocks.bin")) == []
+    assert not summed
 
 
 def _counted(first):
