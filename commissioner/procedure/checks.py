@@ -215,7 +215,7 @@ def keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[CheckR
     if not pace.can_steer:
         took.append(f"{1e3 * pace.request_s:.3g} ms for the shortest request")
     limit = [
-        f"at most {1e3 * pace.samples * sample_period_s:.3g} ms: the drive takes {1.0 / sample_period_s:.0f} samples a second"
+        f"at most {1e3 * pace.whole_s(sample_period_s):.3g} ms: the drive takes {1.0 / sample_period_s:.0f} samples a second"
     ]
     if plan is not None and plan.is_reduced:
         took.append(plan.sentence(sample_period_s))
