@@ -271,7 +271,7 @@ class Runner:
         every_s = min(STATUS_EVERY_S, 0.3 * (progress.facts.watchdog_s or 0.0))
         while True:
             asked_s = inverter.now_s()
-            status = self._stream.ask_status()
+            status = self._stream.supervise()
             left_s = began_s + seconds - inverter.now_s()
             if left_s <= 0.0 or not status.is_energised:
                 break

@@ -72,14 +72,20 @@ class Stream:
             age_s = self._age_s(block)
         return replace(block, age_s=age_s)
 
+    def supervise(self) -> DriveStatus:
+        """As `ask_status`, where nobody reads samples: how many there are tells how fast the drive's time passes."""
+        status = self.ask_status()
+        if status.is_energised and status.samples_produced > 0:
+            self._pin(Counted(status.samples_produced, self._asked_s, self._inverter.now_s()))
+        return status
+
     def ask_status(self) -> DriveStatus:
-        """Judge the drive's status, and take from it how many samples there are, which tells how fast the drive's time passes also where
-        every window is full or nobody reads any, and how large the newest is."""
+        """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
         self._asked_s = self._inverter.now_s()
         status = self._inverter.read_status()
         stop_if(judge_status(status, self._watch))
-        if status.is_energised and status.samples_produced > 0:
-            self._pin(Counted(status.samples_produced, self._asked_s, self._inverter.now_s()))
+        if status.samples_produced > 0:
+            self._clock = self._clock.at_most(status.samples_produced, self._asked_s)
         self.sensors.claim(status)
         return status
 

@@ -46,13 +46,16 @@ class DriveClock:
     rate: float = 1.0
     told_s: float | None = None
     """When the request was sent from whose answer `began_after_s` is; None: it is the request that enabled the drive."""
+    made: int = 0
+    """The most samples that an answer showed: an older one is as old as those behind it last, whatever time passes by any clock."""
 
     def at_most(self, samples: int, sent_s: float) -> DriveClock:
         """The answer to a request sent at `sent_s` showed that the drive had made `samples` and no more."""
+        clock = replace(self, made=max(self.made, samples))
         began_after_s = sent_s - (samples + 1) * self.sample_period_s / self.rate
         if began_after_s < self._began_after_s(sent_s):
-            return self
-        return replace(self, began_after_s=began_after_s, told_s=sent_s)
+            return clock
+        return replace(clock, began_after_s=began_after_s, told_s=sent_s)
 
     def most_made(self, now_s: float) -> float:
         """Samples that the drive can have made by now."""
@@ -60,7 +63,7 @@ class DriveClock:
 
     def age_s(self, samples: int, now_s: float) -> float:
         """The largest time that can have passed since sample number `samples` - 1 ended."""
-        return max(0.0, (self.most_made(now_s) - samples) * self.sample_period_s)
+        return max(0.0, (max(self.most_made(now_s), self.made) - samples) * self.sample_period_s)
 
     def _began_after_s(self, now_s: float) -> float:
         told_s = self.began_after_s if self.told_s is None else self.told_s

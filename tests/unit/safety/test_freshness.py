@@ -29,8 +29,14 @@ def test_a_drive_that_had_made_no_more_began_later():
 
 def test_the_latest_bound_is_kept():
     tight = BEGAN.at_most(samples=20, sent_s=100.5)
-    assert tight.at_most(samples=200, sent_s=100.6) == tight
-    assert BEGAN.at_most(samples=200, sent_s=100.6) == BEGAN
+    assert tight.at_most(samples=200, sent_s=100.6) == replace(tight, made=200)
+    assert BEGAN.at_most(samples=200, sent_s=100.6) == replace(BEGAN, made=200)
+
+
+def test_a_sample_is_as_old_as_those_behind_it_last_by_whatever_clock():
+    far = BEGAN.at_most(samples=20, sent_s=100.5).at_most(samples=200, sent_s=100.6)
+    assert far.age_s(samples=150, now_s=100.6) == pytest.approx(0.5)
+    assert far.at_most(samples=30, sent_s=100.6).age_s(samples=150, now_s=100.6) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("rate", [0.985, 0.9955, 1.0, 1.0045, 1.015])
