@@ -122,38 +122,43 @@ def test_a_flipped_bit_in_a_block_of_counts_costs_that_block_alone(folder, place
     assert [(d.offset, d.size) for d in damage] == [(ends[0], ends[1] - ends[0])]
 
 
-def test_a_frame_that_is_whole_and_deflates_nothing_is_refused(folder):
-    rest = b"no deflated block"
-    (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLKZ", len(rest), zlib.crc32(rest)) + rest)
-    with pytest.raises(DataRefused, match="not this program's"):
-        list(read_blocks(folder.path / "blocks.bin"))
+def _counted(first):
+    k = np.arange(first, first + 29)
+    return {"voltage_axis_v": k * 0.02, **{f"current_{phase}_a": k % 7 * 1e-3 for phase in "uvw"}}
 
 
-@pytest.mark.parametrize("tail", [b"behind it", zlib.compress(bytes(2 << 20), wbits=-15)[:2000]])
-def test_what_stands_behind_a_deflated_block_or_swells_it_is_refused(folder, tail):
-    whole = frame(replace(_block(0), **_counted(0), unit_v=0.02, unit_a=1e-3), 0)[12:]
-    for rest in (whole + tail, whole[:-1], zlib.compress(bytes(900 << 10), wbits=-15)):
-        (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLKZ", len(rest), zlib.crc32(rest)) + rest)
-        with pytest.raises(DataRefused, match="not this program's"):
-            list(read_blocks(folder.path / "blocks.bin"))
+def _framed(mark, payload):
+    return struct.pack("<4sII", mark, len(payload), zlib.crc32(payload)) + payload
 
 
-@pytest.mark.parametrize(
-    "broken",
-    [{"sample_period_s": 0.0}, {"sample_period_s": math.nan}, {"sample_period_s": -1.0}, {"axis_deg": math.inf}, {"dc_link_v": math.nan}],
-)  # fmt: skip
-def test_a_whole_block_of_no_time_or_place_is_refused(folder, broken):
-    """An export divided by it."""
-    folder.append(replace(_block(0), **broken), 0)
-    with pytest.raises(DataRefused, match="not this program's"):
-        list(read_blocks(folder.path / "blocks.bin"))
+def _no_blocks():
+    """Whole frames, by name, that hold no block."""
+    counted = frame(replace(_block(29), **_counted(29), unit_v=0.02, unit_a=1e-3), 0)[12:]
+    yield "deflates nothing", _framed(b"BLKZ", b"no deflated block")
+    yield "cut short", _framed(b"BLKZ", counted[:-1])
+    yield "something behind", _framed(b"BLKZ", counted + b"behind it")
+    yield "swells", _framed(b"BLKZ", zlib.compress(bytes(900 << 10), wbits=-15))
+    yield "too short", _framed(b"BLK1", b"short")
+    yield "a mean over nothing", _framed(b"BLK1", frame(replace(_block(29), averaged=7), 0)[12:-2] + bytes(2))
+    for broken in (
+        {"sample_period_s": 0.0},
+        {"sample_period_s": math.nan},
+        {"sample_period_s": -1.0},
+        {"axis_deg": math.inf},
+    ):
+        yield f"{broken}", frame(replace(_block(29), **broken), 0)
 
 
-def test_a_mean_over_no_control_period_is_refused(folder):
-    payload = frame(replace(_block(0), averaged=7), 0)[12:-2] + bytes(2)
-    (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLK1", len(payload), zlib.crc32(payload)) + payload)
-    with pytest.raises(DataRefused, match="not this program's"):
-        list(read_blocks(folder.path / "blocks.bin"))
+@pytest.mark.parametrize("name", [name for name, _ in _no_blocks()])
+def test_a_whole_frame_that_holds_no_block_costs_that_frame_alone(folder, name):
+    """An export divided by a period of none; by one frame that deflates to nothing all behind it was lost, by --salvage too."""
+    parts = [frame(_block(0), 0), dict(_no_blocks())[name], frame(_block(58), 0)]
+    path = folder.path / "blocks.bin"
+    path.write_bytes(b"".join(parts))
+    damage = []
+    assert [(b.first_index, b.lost_before) for _, b in read_blocks(path, damage)] == [(0, 0), (58, 29)]
+    assert [(d.offset, d.size, d.after) for d in damage] == [(len(parts[0]), len(parts[1]), (0, 29))]
+    assert [b.first_index for _, (_, b) in follow_blocks(path, 0, 9)] == [0]
 
 
 def test_a_mark_that_claims_more_than_any_block_has_costs_no_check_sum(folder, monkeypatch):
@@ -163,11 +168,6 @@ def test_a_mark_that_claims_more_than_any_block_has_costs_no_check_sum(folder, m
     (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLK1", 900_000, 7) * 90_000)
     assert list(read_blocks(folder.path / "blocks.bin")) == []
     assert not summed
-
-
-def _counted(first):
-    k = np.arange(first, first + 29)
-    return {"voltage_axis_v": k * 0.02, **{f"current_{phase}_a": k % 7 * 1e-3 for phase in "uvw"}}
 
 
 @pytest.mark.parametrize("cut", [1, 5, 12, 40, 300, 900])
