@@ -140,7 +140,7 @@ def _captured(pace: StreamPace, control_period_s: float) -> LinkPlan | None:
 def least_baud(pace: StreamPace, control_period_s: float, *, is_reduced: bool) -> float:
     """The serial rate from which on every sample passes; `is_reduced`: from which on a plan exists."""
     bits = BITS_PER_REGISTER * pace.registers + OVERHEAD_BITS
-    whole_s = pace.whole_s(control_period_s)
+    whole_s = pace.samples * control_period_s
     longest_s = LONGEST_LEVEL_SAMPLE_S if pace.kept_samples else LONGEST_SAMPLE_S
     means_s = pace.window_s(pace.longest_mean(longest_s, control_period_s), control_period_s)
     return bits / (max(whole_s, means_s) if is_reduced else whole_s)

@@ -11,5 +11,5 @@ def test_check_says_the_plan_for_a_slow_link_and_what_it_costs(tmp_path):
     assert answer.code == 0, answer.stdout
     (pace,) = [check for check in answer.json["checks"] if check["name"] == "the link keeps up with the samples"]
     assert "the mean of" in pace["value"] and "standard errors" in pace["value"]
-    assert "4.64 ms" in pace["limit"] and "Bd" in pace["remedy"]
+    assert "5.8 ms" in pace["limit"] and "Bd" in pace["remedy"]
     assert not any("ENABLED" in str(row["name"]).upper() for row in states)
