@@ -52,6 +52,10 @@ class StreamPace:
         """Whether direct current can be steered to its levels within the time that a test may take."""
         return self.request_s <= LONGEST_REQUEST_S
 
+    def whole_s(self, control_period_s: float) -> float:
+        """In which the link must pass a window of all channels, each control period a sample."""
+        return FOR_SAMPLES * self.samples * control_period_s
+
     def window_s(self, mean: float, control_period_s: float) -> float:
         """In which the link must pass a window of two currents, each sample the mean of so many control periods."""
         return FOR_SAMPLES * (self.data_registers // len(TWO_CURRENTS)) * mean * control_period_s
@@ -111,7 +115,7 @@ class LinkPlan:
 
 def plan_link(pace: StreamPace | None, control_period_s: float) -> LinkPlan | None:
     """The least reduction that the link carries; None where it carries none. Without a pace nothing is reduced."""
-    if pace is None or pace.round_trip_s <= pace.samples * control_period_s:
+    if pace is None or pace.round_trip_s <= pace.whole_s(control_period_s):
         return LinkPlan()
     if not pace.can_steer:
         return None

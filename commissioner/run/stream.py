@@ -140,7 +140,7 @@ class Stream:
         stream = self._cursor.stream
         if stream.averaged == 1 or self.is_over:
             return None
-        there = (now_s - self._clock.began_after_s) / stream.sample_period_s - self._cursor.next_index
+        there = self._clock.most_made(now_s) - self._cursor.next_index
         return min(stream.samples_per_window, math.ceil(ROOM * max(there, 0.0)) + 2)
 
     def _age_s(self, block: SampleBlock) -> float:

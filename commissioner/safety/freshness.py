@@ -22,6 +22,9 @@ OTHER_TIME = 1.5
 """A time that passes so many times as fast is meant to: a simulated inverter's (`--speed N`)."""
 TOLD_FROM_S = 0.125
 """Between two counts that tell by how many times."""
+LOOSENS = 0.02
+"""Of the time since an answer: what it says of the drive's beginning may be off by now. More than `MOST_OFF`, which is told only after
+seconds; little beside the age of a sample, for answers come many times a second."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +44,30 @@ class DriveClock:
     sample_period_s: float
     first: Counted | None = None
     rate: float = 1.0
+    told_s: float | None = None
+    """When the request was sent from whose answer `began_after_s` is; None: it is the request that enabled the drive."""
+    made: int = 0
+    """The most samples that an answer showed: an older one is as old as those behind it last, whatever time passes by any clock."""
 
     def at_most(self, samples: int, sent_s: float) -> DriveClock:
         """The answer to a request sent at `sent_s` showed that the drive had made `samples` and no more."""
+        clock = replace(self, made=max(self.made, samples))
         began_after_s = sent_s - (samples + 1) * self.sample_period_s / self.rate
-        return replace(self, began_after_s=max(self.began_after_s, began_after_s))
+        if began_after_s < self._began_after_s(sent_s):
+            return clock
+        return replace(clock, began_after_s=began_after_s, told_s=sent_s)
+
+    def most_made(self, now_s: float) -> float:
+        """Samples that the drive can have made by now."""
+        return max(0.0, (now_s - self._began_after_s(now_s)) * self.rate / self.sample_period_s)
 
     def age_s(self, samples: int, now_s: float) -> float:
         """The largest time that can have passed since sample number `samples` - 1 ended."""
-        return max(0.0, (now_s - self.began_after_s) * self.rate - samples * self.sample_period_s)
+        return max(0.0, (max(self.most_made(now_s), self.made) - samples) * self.sample_period_s)
+
+    def _began_after_s(self, now_s: float) -> float:
+        told_s = self.began_after_s if self.told_s is None else self.told_s
+        return self.began_after_s - LOOSENS * max(0.0, now_s - told_s)
 
     def counted(self, now: Counted) -> DriveClock:
         """After another count; where it tells that the drive's time is meant to pass faster, that rate and this count alone say how old samples are."""
@@ -58,7 +76,9 @@ class DriveClock:
         drive_s, ours_s = (now.samples - first.samples) * self.sample_period_s, now.answered_s - first.sent_s
         if ours_s < TOLD_FROM_S or drive_s < OTHER_TIME * ours_s:
             return clock.at_most(now.samples, now.sent_s)
-        return replace(clock, rate=drive_s / ours_s, began_after_s=-math.inf).at_most(now.samples, now.sent_s)
+        return replace(clock, rate=drive_s / ours_s, began_after_s=-math.inf, told_s=None).at_most(
+            now.samples, now.sent_s
+        )
 
     def judge(self, now: Counted) -> StopReason | None:
         """Whether the drive's time between the first count and this one contradicts ours."""

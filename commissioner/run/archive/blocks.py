@@ -7,6 +7,7 @@ and counts the samples that are missing there as lost.
 from __future__ import annotations
 
 import errno
+import math
 import os
 import struct
 import zlib
@@ -17,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.errors import DataRefused
 from commissioner.records import SampleBlock
 
 MARK, PACKED = b"BLK1", b"BLKZ"
@@ -29,8 +29,8 @@ _AGE, _AVERAGED = struct.Struct("<d"), struct.Struct("<H")  # behind the signals
 _UNITS = struct.Struct("<dd")  # before the signals, where these are whole numbers of the drive's counts
 _CLIPPED, _HAS_W, _HAS_AGE, _IS_AVERAGED, _IN_COUNTS = 1, 2, 4, 8, 16
 _FLAGS_AT = _HEADER.size - 1
-LARGEST_BLOCK = 1 << 20
-"""Payload bytes, unpacked; the largest window of a drive makes 4 kB."""
+LARGEST_BLOCK = 1 << 16
+"""Payload bytes, unpacked; eight of a drive's largest windows make 8 kB. Each false mark costs the check sum of so many."""
 
 COUNTS = np.iinfo(np.int16)
 
@@ -76,9 +76,10 @@ def append_frame(descriptor: int, record: bytes, written: int) -> None:
 
 
 def read_blocks(path: Path, damage: list[BlockDamage] | None = None) -> Iterator[Placed]:
-    """Every whole (segment, block) in order; what lies between them is told in `damage`.
+    """Every whole (segment, block) in order; what lies between them is told in `damage`: also a frame whose check sum is right and
+    that holds no block.
 
-    A block behind a damaged one counts the samples that are missing before it. DataRefused: a whole frame holds no block.
+    A block behind a damaged one counts the samples that are missing before it.
     """
     data = path.read_bytes() if path.is_file() else b""
     yield from _walk(data, [] if damage is None else damage)
@@ -94,9 +95,9 @@ def follow_blocks(path: Path, offset: int, most: int) -> list[tuple[int, Placed]
         data = file.read()
     found: list[tuple[int, Placed]] = []
     at = 0
-    while len(found) < most and (whole := _payload(data, at)) is not None:
-        payload, at = whole
-        found.append((offset + at, _decode(payload)))
+    while len(found) < most and (whole := _block_at(data, at)) is not None:
+        placed, at = whole
+        found.append((offset + at, placed))
     return found
 
 
@@ -104,57 +105,55 @@ def _walk(data: bytes, damage: list[BlockDamage]) -> Iterator[Placed]:
     at = 0
     after: tuple[int, int] | None = None
     while at < len(data):
-        whole = _payload(data, at)
-        if whole is not None:
-            payload, at = whole
-            segment, block = _decode(payload)
-            yield segment, block
-            after = segment, block.first_index + block.count
-            continue
-        end = _next_whole(data, at + 1)
-        following = _payload(data, end)
-        if following is None:
-            damage.append(BlockDamage(at, len(data) - at, after, None, True))
-            return
-        payload, next_at = following
-        segment, block = _decode(payload)
-        lost = block.first_index - after[1] if after is not None and after[0] == segment else None
-        damage.append(BlockDamage(at, end - at, after, lost, False))
+        whole = _block_at(data, at)
+        lost = None
+        if whole is None:
+            end = _next_whole(data, at + 1)
+            whole = _block_at(data, end)
+            if whole is None:
+                damage.append(BlockDamage(at, len(data) - at, after, None, True))
+                return
+            (segment, block), _ = whole
+            lost = block.first_index - after[1] if after is not None and after[0] == segment else None
+            damage.append(BlockDamage(at, end - at, after, lost, False))
+        (segment, block), at = whole
         yield segment, block if lost is None else replace(block, lost_before=max(lost, block.lost_before))
-        at = next_at
         after = segment, block.first_index + block.count
 
 
 def _next_whole(data: bytes, at: int) -> int:
-    """Where the next whole frame begins at `at` or later; the end of the data where there is none."""
+    """Where the next whole block begins at `at` or later; the end of the data where there is none."""
     while (at := data.find(MARKS, at)) >= 0:
-        if _payload(data, at) is not None:
+        if _block_at(data, at) is not None:
             return at
         at += 1
     return len(data)
 
 
-def _payload(data: bytes, at: int) -> tuple[bytes, int] | None:
-    """The payload of the whole frame at `at`, unpacked, and where the frame ends; None where there is none."""
+def _block_at(data: bytes, at: int) -> tuple[Placed, int] | None:
+    """The block whose whole frame begins at `at`, and where that ends; None where there is none."""
     if at + _FRAME.size > len(data):
         return None
     mark, size, check = _FRAME.unpack_from(data, at)
     start = at + _FRAME.size
     if mark not in (MARK, PACKED) or size > LARGEST_BLOCK or start + size > len(data):
         return None
-    payload = data[start : start + size]
-    if zlib.crc32(payload) != check:
+    held = data[start : start + size]
+    if zlib.crc32(held) != check:
         return None
-    return (payload if mark == MARK else _unpacked(payload)), start + size
+    payload = _unpacked(held) if mark == PACKED else held
+    placed = None if payload is None else _decode(payload)
+    return None if placed is None else (placed, start + size)
 
 
-def _unpacked(payload: bytes) -> bytes:
-    """DataRefused: a frame whose check sum is right holds what is none of ours."""
+def _unpacked(payload: bytes) -> bytes | None:
+    """None where it is not one whole deflated block, is more than one has, or something stands behind it."""
     unpacking = zlib.decompressobj(-zlib.MAX_WBITS)
     try:
-        return unpacking.decompress(payload, LARGEST_BLOCK)
-    except zlib.error as error:
-        raise _no_block(len(payload), f"a deflated block ({error})") from error
+        unpacked = unpacking.decompress(payload, LARGEST_BLOCK)
+    except zlib.error:
+        return None
+    return unpacked if unpacking.eof and not unpacking.unused_data else None
 
 
 def _encode(block: SampleBlock, segment: int) -> bytes:
@@ -194,9 +193,10 @@ def _units(channels: int, unit_v: float, unit_a: float) -> Values:
     return np.array([[unit_v], *[[unit_a]] * (channels - 1)])
 
 
-def _decode(payload: bytes) -> Placed:
+def _decode(payload: bytes) -> Placed | None:
+    """None where it is no block: not its length, no period above zero, a number that is none."""
     if len(payload) < _HEADER.size:
-        raise _no_block(len(payload), f"at least {_HEADER.size} bytes")
+        return None
     segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
     channels = 4 if flags & _HAS_W else 3
     in_counts = bool(flags & _IN_COUNTS)
@@ -205,24 +205,19 @@ def _decode(payload: bytes) -> Placed:
     has_age, is_averaged = bool(flags & _HAS_AGE), bool(flags & _IS_AVERAGED)
     averaged_at = signals_end + _AGE.size * has_age
     if len(payload) != averaged_at + _AVERAGED.size * is_averaged:
-        raise _no_block(len(payload), f"{channels} signals of {count} samples")
+        return None
     numbers = np.frombuffer(payload, "<i2" if in_counts else "<f8", channels * count, signals_at).reshape(
         channels, count
     )
     unit_v, unit_a = _UNITS.unpack_from(payload, _HEADER.size) if in_counts else (0.0, 0.0)
+    averaged = _AVERAGED.unpack_from(payload, averaged_at)[0] if is_averaged else 1
+    age_s = _AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0
+    if not (averaged and 0.0 < period < math.inf and all(map(math.isfinite, (axis, unit_v, unit_a)))):
+        return None
     signals = numbers * _units(channels, unit_v, unit_a) if in_counts else numbers.astype(np.float64)
     return segment, SampleBlock(
         session=session, first_index=first, sample_period_s=period, axis_deg=axis, voltage_axis_v=signals[0],
         current_u_a=signals[1], current_v_a=signals[2], current_w_a=signals[3] if flags & _HAS_W else None,
         dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
-        age_s=_AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0,
-        averaged=_AVERAGED.unpack_from(payload, averaged_at)[0] if is_averaged else 1,
-        unit_v=unit_v, unit_a=unit_a,
-    )  # fmt: skip
-
-
-def _no_block(size: int, expected: str) -> DataRefused:
-    return DataRefused(
-        "the archived samples are not this program's", step="read the archive", value=f"{size} bytes", limit=expected,
-        remedy="use the run folder as the run left it",
+        age_s=age_s, averaged=averaged, unit_v=unit_v, unit_a=unit_a,
     )  # fmt: skip

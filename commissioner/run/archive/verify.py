@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from commissioner.errors import CommissionerError, DataRefused
+from commissioner.errors import DataRefused
 from commissioner.run.archive.documents import Loss
 from commissioner.run.archive.journal import FIRST, Line, Record, read_lines
 from commissioner.run.archive.seal import CLOSED, as_closed, cover, covered_files, is_sealed_by, to_come
@@ -200,14 +200,11 @@ def _fits(summary: Record, whole: list[Record]) -> bool:
 # --- samples ---------------------------------------------------------------------------------------------------------
 def _count(path: Path, damage: list[BlockDamage]) -> tuple[int, int]:
     """Whole blocks and their samples."""
-    from commissioner.run.archive.blocks import BlockDamage, read_blocks  # late: who shows a run reads no samples
+    from commissioner.run.archive.blocks import read_blocks  # late: who shows a run reads no samples
 
     blocks = samples = 0
-    try:
-        for _, block in read_blocks(path, damage):
-            blocks, samples = blocks + 1, samples + block.count
-    except CommissionerError:
-        damage.append(BlockDamage(0, path.stat().st_size, None, None, False))
+    for _, block in read_blocks(path, damage):
+        blocks, samples = blocks + 1, samples + block.count
     return blocks, samples
 
 

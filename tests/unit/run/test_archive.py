@@ -1,6 +1,7 @@
 """The run folder loses nothing that was written and shows where a kill tore the rest."""
 
 import json
+import math
 import os
 import platform
 import re
@@ -26,8 +27,8 @@ from commissioner.procedure.steps import Findings
 from commissioner.recordings.table import read_table, to_standstill, write_table
 from commissioner.records import SampleBlock
 from commissioner.report.run.standing import Standing
-from commissioner.run.archive import report
-from commissioner.run.archive.blocks import follow_blocks, read_blocks
+from commissioner.run.archive import blocks, report
+from commissioner.run.archive.blocks import follow_blocks, frame, read_blocks
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.folder import RunFolder, write_recording
 from commissioner.run.archive.follow import JournalFollower
@@ -121,16 +122,52 @@ def test_a_flipped_bit_in_a_block_of_counts_costs_that_block_alone(folder, place
     assert [(d.offset, d.size) for d in damage] == [(ends[0], ends[1] - ends[0])]
 
 
-def test_a_frame_that_is_whole_and_deflates_nothing_is_refused(folder):
-    rest = b"no deflated block"
-    (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLKZ", len(rest), zlib.crc32(rest)) + rest)
-    with pytest.raises(DataRefused, match="not this program's"):
-        list(read_blocks(folder.path / "blocks.bin"))
-
-
 def _counted(first):
     k = np.arange(first, first + 29)
     return {"voltage_axis_v": k * 0.02, **{f"current_{phase}_a": k % 7 * 1e-3 for phase in "uvw"}}
+
+
+def _framed(mark, payload):
+    return struct.pack("<4sII", mark, len(payload), zlib.crc32(payload)) + payload
+
+
+def _no_blocks():
+    """Whole frames, by name, that hold no block."""
+    counted = frame(replace(_block(29), **_counted(29), unit_v=0.02, unit_a=1e-3), 0)[12:]
+    yield "deflates nothing", _framed(b"BLKZ", b"no deflated block")
+    yield "cut short", _framed(b"BLKZ", counted[:-1])
+    yield "something behind", _framed(b"BLKZ", counted + b"behind it")
+    yield "swells", _framed(b"BLKZ", zlib.compress(bytes(900 << 10), wbits=-15))
+    yield "too short", _framed(b"BLK1", b"short")
+    yield "a mean over nothing", _framed(b"BLK1", frame(replace(_block(29), averaged=7), 0)[12:-2] + bytes(2))
+    for broken in (
+        {"sample_period_s": 0.0},
+        {"sample_period_s": math.nan},
+        {"sample_period_s": -1.0},
+        {"axis_deg": math.inf},
+    ):
+        yield f"{broken}", frame(replace(_block(29), **broken), 0)
+
+
+@pytest.mark.parametrize("name", [name for name, _ in _no_blocks()])
+def test_a_whole_frame_that_holds_no_block_costs_that_frame_alone(folder, name):
+    """An export divided by a period of none; by one frame that deflates to nothing all behind it was lost, by --salvage too."""
+    parts = [frame(_block(0), 0), dict(_no_blocks())[name], frame(_block(58), 0)]
+    path = folder.path / "blocks.bin"
+    path.write_bytes(b"".join(parts))
+    damage = []
+    assert [(b.first_index, b.lost_before) for _, b in read_blocks(path, damage)] == [(0, 0), (58, 29)]
+    assert [(d.offset, d.size, d.after) for d in damage] == [(len(parts[0]), len(parts[1]), (0, 29))]
+    assert [b.first_index for _, (_, b) in follow_blocks(path, 0, 9)] == [0]
+
+
+def test_a_mark_that_claims_more_than_any_block_has_costs_no_check_sum(folder, monkeypatch):
+    """Each of so many false marks was summed over a megabyte: 3 MB of them took two minutes."""
+    summed = []
+    monkeypatch.setattr(blocks.zlib, "crc32", lambda data: summed.append(len(data)) or 0)
+    (folder.path / "blocks.bin").write_bytes(struct.pack("<4sII", b"BLK1", 900_000, 7) * 90_000)
+    assert list(read_blocks(folder.path / "blocks.bin")) == []
+    assert not summed
 
 
 @pytest.mark.parametrize("cut", [1, 5, 12, 40, 300, 900])

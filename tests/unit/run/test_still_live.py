@@ -196,7 +196,7 @@ class Full(Drive):
 
     def read_status(self):
         self.time_s += self.took_s
-        return SimpleNamespace(samples_produced=0)
+        return SimpleNamespace(is_energised=True, samples_produced=0)
 
 
 def streamed(drive, monkeypatch):
