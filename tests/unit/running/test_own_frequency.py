@@ -33,6 +33,7 @@ def test_it_is_named_with_its_size_and_how_often_it_comes() -> None:
     torque, times = cause.sizes["torque_nm"], cause.sizes["times_a_turn"]
     assert abs(torque[0] - SHARE * scenario.course.constant_nm) < 2.0 * torque[1]
     assert abs(times[0] - TURNS) < 3.0 * times[1] < 0.01
+    assert times[2] == "a turn"
     assert any(remark.startswith("The load pulsates at 39.") and "1.61" in remark for remark in seen.remarks)
 
 

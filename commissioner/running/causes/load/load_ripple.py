@@ -14,7 +14,7 @@ def _sizes(v: Values, s: Scales) -> Sizes:
     return {
         "torque_nm": (part * s.torque_nm, "Nm"),
         "of_rated_torque": (part, ""),
-        "times_a_turn": (v["load_swing_turns"], ""),
+        "times_a_turn": (v["load_swing_turns"], "a turn"),
     }
 
 
