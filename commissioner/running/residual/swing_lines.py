@@ -73,7 +73,8 @@ class _Stretch:
     @property
     def times(self) -> Array:
         """A turn, of the spectrum's bins."""
-        return 2.0 * np.pi / (self.angle[-1] - self.angle[0]) / FINER * np.arange(1, FINER * self.angle.size // 2)
+        step = 2.0 * np.pi / float(self.angle[-1] - self.angle[0]) / FINER
+        return step * np.arange(1, FINER * self.angle.size // 2, dtype=np.float64)
 
     def lines(self, x: Array) -> tuple[Array, Bools]:
         """Amplitudes (n,) at `times`, and which of them stand out."""

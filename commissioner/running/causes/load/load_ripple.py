@@ -31,6 +31,10 @@ CAUSE = Cause(
     sizes=_sizes,
     range=(0.0, 50.0 * 1e3),
     needs=lambda record: not record.has_speed,
+    leaves_open=lambda _: (
+        "The load's pulsation has one amplitude for all of the recording; where it grows with the load, what it has more may be in the load's own "
+        "course: the torque is the least that pulsates there."
+    ),
     confounders=(
         Confounder("rotor_asymmetry", "a second load: a bar's side bands go with the slip, a load's with the speed"),
     ),
