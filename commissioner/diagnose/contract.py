@@ -17,8 +17,8 @@ CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one 
 
 
 class Measured(TypedDict):
-    """A value and one standard deviation, in SI units. Of L_M and T_R `at_stator_flux_wb` is the peak stator flux at which they
-    hold; null: one value for all flux levels of the data."""
+    """A value and one standard deviation, in SI units. Of L_M and T_R, of a running motor of R_R and L_sigma too, `at_stator_flux_wb` is the
+    peak stator flux at which they hold; null: one value for all flux levels of the data."""
 
     value: float | None
     std: float | None

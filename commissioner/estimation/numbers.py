@@ -21,6 +21,7 @@ NAMES = (
     "speed_gain", "speed_lag", "speed_ripple_cos", "speed_ripple_sin", "delay", "current_gain_v", "current_gain_w",
     "current_offset_u", "current_offset_v", "current_offset_w", "current_pair_u", "current_pair_v", "current_pair_w",
     "inertia", "load_constant", "load_linear", "load_fan", "load_breakaway", "load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_ripple_sin_2",
+    "load_swing_cos", "load_swing_sin", "load_swing_turns",
 )  # fmt: skip
 AT = {name: k for k, name in enumerate(NAMES)}
 COUNT = len(NAMES)
@@ -32,9 +33,15 @@ LOGARITHMIC = frozenset(
         "dead_knee", "inertia", "leakage_split",
     )
 )  # fmt: skip
-OF_ANGLE = frozenset(AT[n] for n in NAMES if n.startswith(("speed_ripple", "load_ripple", "cage_asymmetry")))
+OF_ANGLE = frozenset(
+    AT[n]
+    for n in NAMES
+    if n.startswith(("speed_ripple", "load_ripple_", "load_swing_cos", "load_swing_sin", "cage_asymmetry"))
+)
 """Numbers that are told from the shaft's angle, which is any at a window's first sample: each further window has its own."""
-SHAPES = frozenset(AT[n] for n in ("leakage_bend", "leakage_knee", "leakage_split", "bar_corner", "dead_knee"))
+SHAPES = frozenset(
+    AT[n] for n in ("leakage_bend", "leakage_knee", "leakage_split", "bar_corner", "dead_knee", "load_swing_turns")
+)
 """Numbers that shape the law of another one, weakly determined beside it."""
 DEFAULTS = {"leakage_split": 1.0, "leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
 """Leakage of the stator over that of the rotor; leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s;

@@ -1,4 +1,4 @@
-"""The magnetizing inductance at the flux that a recording has: that of little flux follows from the law that was fitted, and nothing shows it."""
+"""The circuit at the flux that a recording has: that of little flux follows from the law that was fitted, and nothing shows it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from commissioner.motor.channels.clock import turn_a_row
 
 TAIL_S = 0.1
 SIDES = ("stator", "gap", "rotor")
+OF_IRON = ("rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h", "rotor_time_constant_s")
+"""What holds at a flux: as that one linear machine has them, together."""
 
 
 def _law(side: str, values: Mapping[str, float]) -> list[float]:
@@ -44,11 +46,11 @@ def stator_flux_wb(record: Record, values: Mapping[str, float]) -> complex:
 
 
 def at_flux(record: Record, values: Mapping[str, float]) -> dict[str, float]:
-    """L_M and T_R of the machine that is linear with the currents of this flux.
+    """R_R, L_sigma, L_M and T_R of the machine that is linear with the currents of this flux: one set, of which any four tell the fifth.
 
     The saturated current is that of an inductance L_M / s across the flux psi_s - k L_sigma i (k: 0 stator, 1 rotor, between them the air gap).
     Seen from the stator that is an inverse-Gamma machine again, with g = 1 / (1 + (1 - k) s L_sigma / L_M): L_M g^2 / (1 + g s),
-    R_R g^2.
+    R_R g^2, L_sigma (k + (1 - k) g). R_s is no part of the iron.
     """
     _, current, _ = _ends_with(record)
     stator = stator_flux_wb(record, values)
@@ -63,6 +65,8 @@ def at_flux(record: Record, values: Mapping[str, float]) -> dict[str, float]:
             share, added = k, z * (law[0] + z * (law[1] + z * law[2]))
     g = 1.0 / (1.0 + (1.0 - share) * added * leakage / main)
     return {
+        "rotor_resistance_ohm": four.rotor_resistance_ohm * g * g,
+        "leakage_inductance_h": leakage * (share + (1.0 - share) * g),
         "magnetizing_inductance_h": main * g * g / (1.0 + g * added),
         "rotor_time_constant_s": four.rotor_time_constant_s / (1.0 + g * added),
     }

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from commissioner.motor.circuit import Quantity
+from commissioner.running.at_flux import OF_IRON
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis, NamedCause
 
@@ -19,8 +20,7 @@ if TYPE_CHECKING:
         NothingRecorded,
     )
 
-CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation; magnetizing inductance and rotor time constant at the stated flux where saturation is named"
-OF_IRON = ("magnetizing_inductance_h", "rotor_time_constant_s")
+CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation; all but the stator resistance at the stated flux where saturation is named"
 NEVER_NAMEABLE = (
     "common gain of the current sensors | common gain of the voltage sensors | all impedances",
     "delay | first-order lag of the current sensors",

@@ -21,6 +21,7 @@ from commissioner.running.causes import CATALOGUE, goes_by, tied_in
 from commissioner.running.causes.cause import Cause
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.residual.lack import Lack, lack_of_fit, not_told, of_shaft, rms_errors
+from commissioner.running.residual.swing_lines import of_swing, swing_of
 from commissioner.running.rules import RULES
 from commissioner.running.search import Found, Named, Step, search, so_far
 
@@ -70,7 +71,7 @@ class Gain:
 @dataclass(frozen=True)
 class Diagnosis:
     """Everything the report shows. `found` is None where the data were refused, or the time was over before four numbers were fitted.
-    `stator_flux_wb`: where the iron saturates, the peak flux at which L_M and T_R of `parameters_after` hold."""
+    `stator_flux_wb`: where the iron saturates, the peak flux at which `parameters_after` hold, all but R_s."""
 
     verdict: DiagnosisVerdict
     reason: str
@@ -135,7 +136,12 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     causes = tuple(sorted((_cause(found, one) for one in found.accepted), key=lambda c: -c.gain_share))
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain) if found.is_complete else UNFINISHED
-    remarks = [*record.remarks, *not_told(found.fit), *of_shaft(left)]
+    remarks = [
+        *record.remarks,
+        *not_told(found.fit),
+        *of_shaft(left),
+        *of_swing(swing_of(found.problem, found.fit.machine)),
+    ]
     if verdict == "unexplained" and causes and gain.explained_share < MOSTLY_GUESSES:
         guesses = ", ".join(c.name.replace("_", " ") for c in causes)
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")

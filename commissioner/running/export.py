@@ -51,6 +51,8 @@ def model_document(found: Found, record: Record) -> RunningModel:
     """What `model.json` holds. `numbers`: those of the machine that are not none; relative ones as in the chapter `running`."""
     machine = found.fit.machine
     values = machine.values()
+    if not (values["load_swing_cos"] or values["load_swing_sin"]):
+        values["load_swing_turns"] = 0.0  # where one was looked for
     kept = {n: v for n, v in values.items() if v != 0.0 and (n in FOUR or n == "inertia" or v != DEFAULTS.get(n))}
     return {
         "format": FORMAT,

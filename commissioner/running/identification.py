@@ -39,6 +39,7 @@ from commissioner.motor.channels.faults import currents_on_time
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
+from commissioner.running.at_flux import OF_IRON
 from commissioner.running.nominal import OPEN_INERTIA, require_a_motor, with_shaft, with_speed
 from commissioner.running.residual.lack import Lack, lack_of_fit, not_told
 
@@ -325,7 +326,6 @@ def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | Non
 def as_document(seen: Identified) -> RunningDocument:
     """The contract's keys, and the inertia, the bound and the covariance beside them."""
     flux = seen.stator_flux_wb
-    at_flux = ("magnetizing_inductance_h", "rotor_time_constant_s")
     t = seen.t_model
     seconds = {
         name: float(sum((w.state == k).sum() for w in seen.record.windows)) * seen.record.period_s
@@ -337,7 +337,7 @@ def as_document(seen: Identified) -> RunningDocument:
         "kind": "running",
         "convention": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
         "estimator": "least squares on a running machine",
-        "parameters": {k: _measured(q, flux if k in at_flux else None) for k, q in seen.parameters.items()},
+        "parameters": {k: _measured(q, flux if k in OF_IRON else None) for k, q in seen.parameters.items()},
         "inertia_kg_m2": None if seen.inertia is None else _measured(seen.inertia),
         "load": dict(seen.load),
         "bound_std": dict(seen.bound),

@@ -21,6 +21,7 @@ from commissioner.estimation.fit import (
     columns_of,
     fitted_part,
     jacobian,
+    numbers_of,
     plain_machine,
     refine,
     residuals,
@@ -33,6 +34,7 @@ from commissioner.estimation.record import STATES, Record
 from commissioner.estimation.told import Slopes
 from commissioner.motor.nameplate import prior
 from commissioner.running.residual.ripple_lines import slips_of
+from commissioner.running.residual.swing_lines import turns_of_swing
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -52,6 +54,8 @@ RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
 """Of an encoder, at the shaft's frequency."""
 LOAD_RIPPLE = ("load_ripple_cos", "load_ripple_sin", "load_ripple_cos_2", "load_ripple_sin_2")
 """Of a load, once and twice a turn; like friction it takes torque from a shaft that turns, and drives none that stands."""
+SWING, LEAST_SWING = ("load_swing_cos", "load_swing_sin"), 0.02
+"""Of a load, at a frequency of its own; the share of the noise's power from which it is looked for before the load's changes."""
 STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))
 """Factors on the plate's four, tried in turn until one leaves the valley where R_s is near zero."""
 USUAL = {
@@ -97,9 +101,30 @@ def nominal(problem: Problem) -> tuple[Problem, Fit]:
     fit = with_speed(problem) if record.has_speed else with_shaft(problem)
     problem, fit = weighted(*best_reading(problem, fit))
     if not record.has_speed:
-        fit = with_load_changes(problem, fit)
+        fit = with_turns_of_swing(problem, fit)
+        if not swings(problem, fit):
+            fit = with_turns_of_swing(problem, with_load_changes(problem, fit))
     require_a_motor(problem, fit)
     return problem, fit
+
+
+def with_turns_of_swing(problem: Problem, fit: Fit) -> Fit:
+    """The same fit, told how often a turn the load would pulsate, if it does: that number moves nothing before it has a size."""
+    machine = fit.machine
+    if any(machine.value(name) for name in SWING):
+        return fit
+    return replace(fit, machine=machine.with_values({"load_swing_turns": turns_of_swing(problem, machine)}))
+
+
+def swings(problem: Problem, fit: Fit) -> bool:
+    """Whether a load that pulsates at a frequency of its own makes most of what is left: knots near each other, of which a short recording has enough to follow
+    it, would pass for a load that changes."""
+    excess = fit.chi2 - fit.count
+    if fit.chi2 < (1.0 + LEAST_SWING) * fit.count:
+        return False
+    own = jacobian(problem, fit.machine, numbers_of(SWING, problem.record))
+    left = Slopes.known(np.concatenate([fit.jacobian, own])).apart(fit.rest[None])[0]
+    return float(fit.rest @ fit.rest - left @ left) > LEAST_BY_LOAD * excess
 
 
 def require_a_motor(problem: Problem, fit: Fit) -> None:

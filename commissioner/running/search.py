@@ -26,7 +26,14 @@ from commissioner.estimation.record import Record
 from commissioner.estimation.told import Slopes
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
-from commissioner.running.nominal import NEAR, grown_anew, held_at_plate, nominal, with_load_changes
+from commissioner.running.nominal import (
+    NEAR,
+    grown_anew,
+    held_at_plate,
+    nominal,
+    with_load_changes,
+    with_turns_of_swing,
+)
 from commissioner.running.rules import RULES
 
 Array = NDArray[np.float64]
@@ -198,7 +205,7 @@ class Search:
         """A first step that left what a sign allows begins from little instead."""
         for one in causes:
             first = one.form.numbers[0]
-            if one.form.spare and machine.value(first) <= 0.0:
+            if one.form.spare and not one.form.is_signed and machine.value(first) <= 0.0:
                 machine = machine.with_values({first: 0.02})
         return machine
 
@@ -363,6 +370,7 @@ def _needed(seeking: Search, one: Named) -> float:
 
 def _forward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]] | None:
     """The cause that gains most and holds on what was kept aside, or two that do so together; None where none does."""
+    fit = fit if seeking.problem.record.has_speed or not accepted else with_turns_of_swing(seeking.problem, fit)
     tried = _tried(seeking, fit, fit, accepted)
     first = next((t for t in tried if not t.why), None)
     alone = next((t for t in tried if t.why == WORSE), None)

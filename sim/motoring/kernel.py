@@ -20,7 +20,7 @@ from sim.physics.compiled import kernel, piece
 (
     AMPLITUDE, OMEGA, UNBALANCE, UNBALANCE_RAD, FIFTH, SEVENTH, WANDER, WANDER_RATE, PHASE, RAMP, BOOST, SUPPLY_SIZE,
 ) = range(12)  # fmt: skip
-CONSTANT, FAN, RIPPLE_1, RIPPLE_2, STEPS = range(5)
+CONSTANT, FAN, RIPPLE_1, RIPPLE_2, SWING, SWING_TURNS, STEPS = range(7)
 STATES = 13
 
 
@@ -49,7 +49,10 @@ def _load(course, t, speed, angle, synchronous):
         late = (t - course[STEPS + 2 * k]) / 2e-3
         if late > -20.0:
             torque += course[STEPS + 2 * k + 1] / (1.0 + math.exp(-min(late, 40.0)))
-    return torque * (1.0 + course[RIPPLE_1] * math.cos(angle) + course[RIPPLE_2] * math.cos(2.0 * angle + 0.6))
+    ripple = course[RIPPLE_1] * math.cos(angle) + course[RIPPLE_2] * math.cos(2.0 * angle + 0.6)
+    if course[SWING] != 0.0:
+        ripple += course[SWING] * math.cos(course[SWING_TURNS] * angle + 1.1)
+    return torque * (1.0 + ripple)
 
 
 @piece

@@ -44,7 +44,8 @@ class Course:
     """`open_s`: contactor open before; `is_running`: turning in steady state from the first sample.
 
     `load`: constant torque, per speed squared (both N m at synchronous speed); `steps`: (time after closing, torque added).
-    `ripple`: share of the load at once and twice the shaft's frequency.
+    `ripple`: share of the load at once and twice the shaft's frequency; `swing`: share of the load that pulsates so many times a turn
+    of the shaft, as one behind a belt or a gear does.
     """
 
     duration_s: float = 3.0
@@ -55,6 +56,7 @@ class Course:
     fan_nm: float = 0.0
     steps: tuple[tuple[float, float], ...] = ()
     ripple: tuple[float, float] = (0.0, 0.0)
+    swing: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ def play(scenario: Scenario) -> Played:
     m = machine_array(scenario)
     s = _supply_array(scenario)
     steps = [value for step in course.steps for value in step]
-    load = np.array([course.constant_nm, course.fan_nm, *course.ripple, *steps])
+    load = np.array([course.constant_nm, course.fan_nm, *course.ripple, *course.swing, *steps])
     period = 1.0 / course.rate_hz
     substeps = max(4, math.ceil(period / FINE_STEP_S))
     h = period / substeps

@@ -56,7 +56,7 @@ DEAD, DEAD_KNEE, V_GAIN, V_OFFSET = AT["dead_voltage"], AT["dead_knee"], AT["vol
 W_GAIN, W_LAG, W_RIPPLE, DELAY = AT["speed_gain"], AT["speed_lag"], AT["speed_ripple_cos"], AT["delay"]
 GAIN, OFFSET, PAIR = AT["current_gain_v"], AT["current_offset_u"], AT["current_pair_u"]
 INERTIA, CONSTANT, LINEAR, FAN = AT["inertia"], AT["load_constant"], AT["load_linear"], AT["load_fan"]
-LOADS, RIPPLE = 8, AT["load_ripple_cos"]
+LOADS, RIPPLE, SWING, SWING_TURNS = 11, AT["load_ripple_cos"], AT["load_swing_cos"], AT["load_swing_turns"]
 SLOWEST2, SLOW2 = 1e-5, 1e-3
 """Squares of the shares of synchronous speed over which a friction comes to its full torque, and over which that of breaking away is lost."""
 MOST_FLUX = 6.0
@@ -141,6 +141,13 @@ def _ripple_laws(dry, angle):
 
 
 @_inlined
+def _swing_laws(p, dry, angle):
+    """The same of the two from `load_swing_cos` on, and what the turns are multiplied with for a small change of theirs."""
+    c, s = _cos_sin(p[SWING_TURNS] * angle)
+    return dry * c, dry * s, dry * angle * (p[SWING + 1] * c - p[SWING] * s)
+
+
+@_inlined
 def _by_laws(p, share, angle, has_ripple):
     """Torque of friction, fan and ripple, of rated torque."""
     dry, linear, fan, breaking = _friction_laws(share)
@@ -148,6 +155,9 @@ def _by_laws(p, share, angle, has_ripple):
     if has_ripple:
         c, s, cc, ss = _ripple_laws(dry, angle)
         load += p[RIPPLE] * c + p[RIPPLE + 1] * s + p[RIPPLE + 2] * cc + p[RIPPLE + 3] * ss
+    if p[SWING_TURNS] != 0.0 and (p[SWING] != 0.0 or p[SWING + 1] != 0.0):
+        c, s, _ = _swing_laws(p, dry, angle)
+        load += p[SWING] * c + p[SWING + 1] * s
     return load
 
 
@@ -592,7 +602,7 @@ def tangents(p, scales, x0, along, voltage, speed, load_torque, period, is_free,
         own_path = States(path[:count], path, within, False)
         is_moving = _moves(bare, scales, own_path, numbers, volts, speeds, level, period, is_free, moves)
         if is_free:
-            _by_shaft(torques, within, scales, count, moves)
+            _by_shaft(bare, torques, within, scales, count, moves)
             if _turns_load_alone(bare, is_free):
                 _by_angle(within, count, moves)
         for q in range(count):
@@ -648,10 +658,10 @@ def _as_lines(p, scales, within):
 
 
 @_inlined
-def _by_shaft(torques, within, scales, count, moves):
+def _by_shaft(p, torques, within, scales, count, moves):
     """Numbers of the inertia and the load move the state as a load at the four stages does. `torques` (P, 1 + LOADS)."""
     w_n, torque_n, pairs = scales[2], scales[3], scales[4]
-    free, laws = np.empty(torques.shape[0], dtype=np.int64), np.empty(1 + LOADS)
+    free, laws = np.empty(torques.shape[0], dtype=np.int64), np.zeros(1 + LOADS)
     many = 0
     for c in range(torques.shape[0]):
         is_told = False
@@ -665,6 +675,8 @@ def _by_shaft(torques, within, scales, count, moves):
             laws[0] = within[q, stage, 2] / (pairs * torque_n)
             laws[1], laws[2], laws[3], laws[4] = _friction_laws(within[q, stage, 0] / w_n)
             laws[5], laws[6], laws[7], laws[8] = _ripple_laws(laws[1], within[q, stage, 1] / pairs)
+            if p[SWING_TURNS] != 0.0:
+                laws[9], laws[10], laws[11] = _swing_laws(p, laws[1], within[q, stage, 1] / pairs)
             for place in range(many):
                 c, load = free[place], 0.0
                 for j in range(1 + LOADS):

@@ -164,7 +164,7 @@ def _parameters(document: Document) -> Section:
             ]
             rows.append((q.name, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))
     flux = (document["parameters_after"].get("magnetizing_inductance_h") or {}).get("at_stator_flux_wb")
-    caption = f"L_M and T_R hold at a peak stator flux of {number(flux)} Wb." if flux else ""
+    caption = f"R_R, L_sigma, L_M and T_R hold together at a peak stator flux of {number(flux)} Wb." if flux else ""
     return Section(
         "The machine's numbers",
         Table(("", "plain simulation", "with the causes", "plain one was off by"), rows, caption=caption),

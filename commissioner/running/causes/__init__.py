@@ -7,6 +7,7 @@ from collections.abc import Callable
 from commissioner.estimation.record import Record
 from commissioner.running.causes.cause import Cause, Confounder, Values
 from commissioner.running.causes.iron import iron_loss, leakage_saturation, magnetizing_saturation
+from commissioner.running.causes.load import load_ripple
 from commissioner.running.causes.rotor import rotor_asymmetry, rotor_heating, rotor_skin_effect
 from commissioner.running.causes.sensors import (
     sample_period,
@@ -26,7 +27,7 @@ CATALOGUE: dict[str, Cause] = {
     for room in (
         magnetizing_saturation, leakage_saturation, iron_loss, rotor_skin_effect, rotor_heating, rotor_asymmetry, stator_heating,
         stator_asymmetry, line_resistance, dead_time, sensor_gain_mismatch, sensor_offset, sampling_delay, sensor_lag,
-        voltage_gain_mismatch, voltage_offset, speed_sensor_gain, sample_period, speed_sensor_lag,
+        voltage_gain_mismatch, voltage_offset, speed_sensor_gain, sample_period, speed_sensor_lag, load_ripple,
     )
 }  # fmt: skip
 

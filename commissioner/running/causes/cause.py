@@ -22,12 +22,13 @@ PHASES = "uvw"
 @dataclass(frozen=True)
 class Form:
     """One way in which a cause can be there. `numbers` are screened from zero; `spare` ones are freed once it is accepted;
-    `needs`: of the recording."""
+    `needs`: of the recording; `is_signed`: whether the first number may be less than nothing beside spare ones."""
 
     name: str
     numbers: tuple[str, ...]
     spare: tuple[str, ...] = ()
     needs: Callable[[Record], bool] = field(default=lambda _: True, compare=False)
+    is_signed: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ SPOKEN = {
     "loop_conductance_v": 0.03, "loop_susceptance_v": 0.01, "line_re": 0.02, "line_im": -0.01, "dead_voltage": 0.005,
     "voltage_gain_re": 0.002, "voltage_gain_im": 0.003, "voltage_offset_re": 1e-4, "speed_gain": 0.001, "speed_lag": 1e-3,
     "speed_ripple_cos": 1e-3, "delay": 5e-5, "current_gain_v": 0.01, "current_gain_w": -0.02, "current_offset_u": 0.005,
+    "load_swing_cos": 0.04, "load_swing_sin": -0.02, "load_swing_turns": 1.618,
 }  # fmt: skip
 
 
@@ -236,9 +237,13 @@ def test_saturation_of_the_air_gaps_flux_is_that_of_the_t_circuit():
     assert np.abs(found[:, 0] + 1j * found[:, 1] - expected).max() < 1e-4 * np.abs(expected).max()
 
 
-def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns():
-    """Without voltage. At rest none of its torque moves the shaft; turning with W, a cos(2 theta) of it swings the speed by a T / (2 J W)."""
-    p, count, x = numbers({"load_ripple_cos": 0.06, "load_ripple_cos_2": 0.03, "inertia": 0.1}), 500, np.zeros(STATES)
+@pytest.mark.parametrize(
+    ("extra", "turns"),
+    [({"load_ripple_cos_2": 0.03}, 2.0), ({"load_swing_cos": 0.03, "load_swing_turns": 1.618}, 1.618)],
+)
+def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns(extra, turns):
+    """Without voltage. At rest none of its torque moves the shaft; turning with W, a cos(k theta) of it swings the speed by a T / (k J W)."""
+    p, count, x = numbers({"load_ripple_cos": 0.06, "inertia": 0.1} | extra), 500, np.zeros(STATES)
     t = 0.5 * PERIOD * np.arange(2 * count - 1)
     none, load = np.zeros((t.size, 2)), Load(np.zeros(2), np.zeros(t.size))
     out, shaft = np.empty((count, 3)), np.empty((count, 2))
@@ -246,7 +251,7 @@ def test_a_load_that_ripples_drives_no_shaft_at_rest_and_swings_one_that_turns()
     assert np.abs(shaft[:, 0]).max() == 0.0
     x[8], p[AT["load_ripple_cos"]] = 300.0, 0.0
     march(p, SCALES.as_tuple(), x, none, none, load, PERIOD, True, out, shaft)
-    swing = -0.03 * 26.0 / 0.1 / (2 * 150.0) * np.sin(2 * 150.0 * t[::2])
+    swing = -0.03 * 26.0 / 0.1 / (turns * 150.0) * np.sin(turns * 150.0 * t[::2])
     assert (shaft[:, 0] - 300.0) / 2 == pytest.approx(swing, abs=0.02 * np.abs(swing).max())
 
 

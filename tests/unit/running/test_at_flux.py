@@ -45,7 +45,8 @@ def test_the_linear_machine_at_this_flux_draws_the_same_current(side: str, share
     told = at_flux(record, values)  # type: ignore[arg-type]
     assert abs(stator_flux_wb(record, values)) == pytest.approx(abs(stator), rel=1e-6)  # type: ignore[arg-type]
     main = told["magnetizing_inductance_h"]
-    leakage = share * L_SIGMA + (1.0 - share) * L_SIGMA / (1.0 + (1.0 - share) * added * L_SIGMA / L_M)
-    seen = _terminal_current(stator, leakage, main, main / told["rotor_time_constant_s"])
+    resistance = told["rotor_resistance_ohm"]
+    assert told["rotor_time_constant_s"] == pytest.approx(main / resistance, rel=1e-12)
+    seen = _terminal_current(stator, told["leakage_inductance_h"], main, resistance)
     assert abs(seen - current) < 1e-6 * abs(current)
     assert main < 0.8 * L_M
