@@ -253,7 +253,7 @@ def _nothing_left(clipped: Sequence[str], remarks: Sequence[str]) -> DataRefused
         " ".join(["no stretch with voltage and current in every phase is long enough.", *remarks]),
         0.0,
         f"{LEAST_S} s",
-        "record a start, load steps, or a second of steady running, with all three phases closed",
+        "record a start, load steps, or a second of steady running, with all three phases closed; a test at standstill has the columns segment, axis_deg and voltage_axis_v",
     )
 
 

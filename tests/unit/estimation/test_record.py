@@ -102,6 +102,18 @@ def test_a_phase_that_is_open_throughout_is_what_a_refusal_names(start):
         prepare([with_phase_u_open(recording, -np.inf)], plate)
 
 
+def test_a_test_at_standstill_without_its_columns_is_told_which_they_are():
+    """Phase voltages of one axis: nothing turns."""
+    t = np.arange(10_000) * 2e-4
+    noise = 0.005 * np.random.default_rng(3).standard_normal((6, t.size))
+    axis = np.array([[1.0], [-0.5], [-0.5]])
+    volts, amps = 60.0 * axis * np.sin(126.0 * t) + noise[:3], 4.0 * axis * np.sin(126.0 * t - 0.6) + noise[3:]
+    one = RunningRecording(t, tuple(amps), tuple(volts), False, None, 2e-4, source="axis.csv")
+    with pytest.raises(DataRefused) as refusal:
+        prepare([one], PLATE)
+    assert "segment, axis_deg and voltage_axis_v" in refusal.value.remedy
+
+
 def test_no_phase_of_a_sound_recording_is_called_open(start):
     assert not any("carries no current" in r for r in prepare([start[0]], start[1]).remarks)
 
