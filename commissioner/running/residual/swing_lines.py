@@ -94,9 +94,7 @@ class _Stretch:
         times, beside = self.times, BESIDE_BINS * 2.0 * np.pi / (self.angle[-1] - self.angle[0])
         supply = self.supply / self.usual
         asked = (times > LEAST_HZ * 2.0 * np.pi / self.usual) & (times < MOST_TURNS)
-        moved = (
-            float(np.ptp(self.speed)) / self.usual
-        )  # by a load step: what goes with the supply is no line over the angle
+        moved = float(np.ptp(self.speed)) / self.usual  # what goes with the supply is no line over the angle then
         for whole, wide in ((1.0, 0.0), (supply, moved)):
             nearest = np.maximum(np.round(times / whole), 1.0) * whole
             asked &= np.abs(times - nearest) > beside + wide * nearest
