@@ -263,11 +263,15 @@ class Desk:
         """Take up runs that somebody started from the command line, until the service closes."""
         while not self.is_closing:
             with contextlib.suppress(OSError):  # a folder that cannot be read now may be at the next look
-                self._holding = await asyncio.to_thread(runs_holding)
-                for folder in await asyncio.to_thread(going_on, self.settings.runs, self._holding):
-                    if self._is_unknown(folder.name) and not self._is_beginning(folder):
-                        await self._take_up(folder)
+                await self.look()
             await asyncio.sleep(LOOK_S)
+
+    async def look(self) -> None:
+        """One of these looks. OSError: a folder that cannot be read."""
+        self._holding = await asyncio.to_thread(runs_holding)
+        for folder in await asyncio.to_thread(going_on, self.settings.runs, self._holding):
+            if self._is_unknown(folder.name) and not self._is_beginning(folder):
+                await self._take_up(folder)
 
     def _is_unknown(self, run: str) -> bool:
         """Also one that fell silent, was given up, and has its drive all the same."""

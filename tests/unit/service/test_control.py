@@ -125,15 +125,22 @@ def test_what_writes_into_a_drive_goes_on_where_the_service_is_shut_down(tmp_pat
     script = f"import time, pathlib; time.sleep(0.15); pathlib.Path({str(done)!r}).touch()"
     monkeypatch.setattr(child, "program", lambda *_: [sys.executable, "-c", script])
 
+    begun: list[asyncio.subprocess.Process] = []
+    begin = asyncio.create_subprocess_exec
+
+    async def noted(*arguments, **options):
+        begun.append(await begin(*arguments, **options))
+        return begun[-1]
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", noted)
+
     async def shut_down():
         asking = asyncio.create_task(child.succeed(["write-back"], tmp_path / "log", may_kill=may_kill))
-        await asyncio.sleep(0.1)
+        while not begun:
+            await asyncio.sleep(0.01)
         asking.cancel()
         await asyncio.gather(asking, return_exceptions=True)
-        for _ in range(100 if not may_kill else 3):
-            if done.exists():
-                break
-            await asyncio.sleep(0.1)
+        await begun[0].communicate()
 
     asyncio.run(shut_down())
     assert done.exists() is not may_kill

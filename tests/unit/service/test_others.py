@@ -21,17 +21,16 @@ def cut_off(folder, ago):
 
 
 def live(runs):
-    """Ids of the runs that the service takes to go on, a moment after it began to look."""
+    """Ids of the runs that the service takes to go on, once it has looked."""
     desk = make_parts(Settings(runs, runs.parent / "data")).desk
 
     async def look():
-        looking = asyncio.create_task(desk.look_around())
-        await asyncio.sleep(0.2)
+        await desk.look()
         seen = [run.id for run in desk.live()]
-        assert not looking.done()
         desk.is_closing = True
-        for task in (looking, *(run.follower for run in desk.runs.values() if run.follower is not None)):
-            task.cancel()
+        for run in desk.runs.values():
+            if run.follower is not None:
+                run.follower.cancel()
         return seen
 
     return asyncio.run(look())
