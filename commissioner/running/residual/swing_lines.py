@@ -112,8 +112,9 @@ def turns_of_swing(problem: Problem, machine: Machine) -> float:
             continue
         seen = (rest[:, 0] + 1j * rest[:, 1]) * np.conj(frame_of_voltage(w)[0])
         power = np.sum(np.abs(stretch.spectrum(seen[stretch.part])) ** 2, axis=0)
-        top = int(np.argmax(power * stretch.is_asked(pairs)))
-        if stretch.is_asked(pairs)[top] and power[top] > best:
+        is_asked = stretch.is_asked(pairs)
+        top = int(np.argmax(power * is_asked))
+        if is_asked[top] and power[top] > best:
             best, found = float(power[top]), stretch.times_of(power, top)
     return found
 
@@ -126,9 +127,10 @@ def swing_of(problem: Problem, machine: Machine) -> Swing | None:
         if stretch is None:
             continue
         (seen, is_line), (torque, _) = (stretch.lines(x) for x in (stretch.speed, shaft[stretch.part, 1]))
-        top = int(np.argmax(seen * (is_line & stretch.is_asked(scales.pole_pairs))))
+        is_told = is_line & stretch.is_asked(scales.pole_pairs)
+        top = int(np.argmax(seen * is_told))
         of_speed = float(seen[top]) / stretch.usual
-        if not (is_line & stretch.is_asked(scales.pole_pairs))[top] or of_speed < LEAST_SWING:
+        if not is_told[top] or of_speed < LEAST_SWING:
             continue
         voltage = np.hypot(*w.voltage[::2][stretch.part].T)
         in_voltage, is_flicker = stretch.lines(voltage)
