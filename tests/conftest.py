@@ -28,6 +28,7 @@ REALTIME = (
     "integration/service",
     "integration/link",
     "integration/test_kill.py",
+    "integration/test_stopped.py",
     "sim/test_faults.py",
     "sim/test_server.py",
 )
