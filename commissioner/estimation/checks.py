@@ -13,6 +13,7 @@ from commissioner.estimation.numbers import Scales
 from commissioner.motor.channels.clock import turn_a_row, wrong_unit
 from commissioner.motor.channels.faults import no_lines
 from commissioner.motor.channels.levels import current_level, voltage_level
+from commissioner.motor.channels.spikes import noise_of
 from commissioner.records import RunningRecording
 
 if TYPE_CHECKING:
@@ -61,14 +62,8 @@ def refused(what: str, value: object, limit: object, remedy: str) -> DataRefused
     return DataRefused(what, step="read running recording", value=value, limit=limit, remedy=remedy)
 
 
-def noise_of(x: Array) -> float:
-    """Standard deviation of white noise from sixth differences, which no harmonic of the supply passes (robust)."""
-    d = np.diff(x, 6)
-    d = d[np.isfinite(d)]
-    return float(np.median(np.abs(d)) / 0.6745 / np.sqrt(924.0)) if d.size else 0.0
-
-
-def check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
+def check(one: RunningRecording, voltage: Array, scales: Scales) -> float:
+    """Hz of its supply (`hz_of_supply`); DataRefused where length, time, rate or voltage are no recording's."""
     per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
     if one.time_s.size < LEAST_SAMPLES:
         raise refused(
@@ -97,6 +92,7 @@ def check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
             "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages"
             f"{_for_monitor(one, per_period)}",
         )  # fmt: skip
+    return supply_hz
 
 
 def check_lines(one: RunningRecording, voltage: Array, scales: Scales) -> None:

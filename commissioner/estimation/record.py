@@ -23,15 +23,14 @@ from commissioner.estimation.checks import (
     check_lines,
     check_order,
     check_sizes,
-    hz_of_supply,
     is_crossed,
-    noise_of,
     refused,
 )
 from commissioner.estimation.numbers import Scales
 from commissioner.motor import standing
 from commissioner.motor.channels.clock import off_mains
 from commissioner.motor.channels.faults import without_clipped
+from commissioner.motor.channels.spikes import noise_of
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -173,7 +172,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
             what = f"{one.source}: sampled at another rate than the first file"
             raise refused(what, one.sample_period_s, period, "diagnose them one by one")
-        check(one, _voltages(one), scales)
+        supplies.append(check(one, _voltages(one), scales))
         one, cut_off = without_clipped(one)  # noqa: PLW2901
         remarks += cut_off
         clipped += cut_off
@@ -211,7 +210,6 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             )
         own = tuple(_windows(signed, current, voltage, plate, has_speed, scales, ~is_open))
         standing_still += (said for w in own if (said := _not_started(w, one, scales, has_speed)))
-        supplies.append(hz_of_supply(one, voltage, scales))
         own, of_windows = _checked(own, one, supplies[-1], has_speed, scales)
         remarks += of_windows
         windows += own

@@ -23,15 +23,16 @@ def of_speed_gain(supply_hz: float | None, gain: float) -> Literal["sensor", "pe
     the two are one. Of mains their frequency tells; `supply_hz`: by the time column, None of an inverter or where it moves."""
     if supply_hz is None:
         return "either"
-    by_sensor, by_period = (_off(hz) for hz in (supply_hz, supply_hz / (1.0 - gain)))
+    by_sensor, by_period = (abs(_off(hz)[1]) for hz in (supply_hz, supply_hz / (1.0 - gain)))
     if by_sensor < KEPT and by_period > OF_GRID:
         return "sensor"
     return "period" if by_sensor > KEPT and by_period < OF_GRID else "either"
 
 
-def _off(supply_hz: float) -> float:
-    """Share by which it leaves the nearer mains' frequency."""
-    return min(abs(supply_hz / hz - 1.0) for hz in MAINS_HZ)
+def _off(supply_hz: float) -> tuple[float, float]:
+    """(the nearer mains' frequency, share by which it is left)."""
+    nearest = min(MAINS_HZ, key=lambda hz: abs(supply_hz / hz - 1.0))
+    return nearest, supply_hz / nearest - 1.0
 
 
 def wrong_unit(supply_hz: float, rated_hz: float) -> str | None:
@@ -44,8 +45,7 @@ def wrong_unit(supply_hz: float, rated_hz: float) -> str | None:
 
 def off_mains(supply_hz: float) -> str | None:
     """What to say of a supply that turns near the mains' frequency, and not at it."""
-    nearest = min(MAINS_HZ, key=lambda hz: abs(supply_hz / hz - 1.0))
-    off = supply_hz / nearest - 1.0
+    nearest, off = _off(supply_hz)
     if not KEPT < abs(off) < LIKE_MAINS:
         return None
     return (

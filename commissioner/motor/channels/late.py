@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.motor.channels.spikes import noise_of
 from commissioner.records import Signal
 
 Array = NDArray[np.float64]
@@ -119,7 +120,7 @@ def _is_filtered(group: Sequence[Signal], late_s: tuple[float, float, float], pe
     pulse[REPLY // 2] = 1.0
     late_pulse = np.nan_to_num(shifted(pulse, -late / period_s))
     reply = _low_pass(pulse, late, period_s) - late_pulse
-    noise = (float(np.median(np.abs(np.diff(others, 6)))) / 0.6745) ** 2 / 924.0
+    noise = noise_of(others) ** 2
     of_noise, shared = noise * float(reply @ reply), -noise * float(reply @ late_pulse)
     if float(apart.var()) < CLEAR * of_noise:
         return None
@@ -187,7 +188,7 @@ def _solved(columns: Array, total: Array) -> tuple[Array, Array]:
 
 def _is_told(total: Array, left_plain: Array, left: Array, told: Array, unit: float) -> bool:
     """Whether gains and delays explain the sum, and delays what gains alone do not."""
-    noise = (float(np.median(np.abs(np.diff(total, 6)))) / 0.6745) ** 2 / 924.0
+    noise = noise_of(total) ** 2
     all_of_it, rest, rest_plain = (float(np.mean(y**2)) for y in (total, left, left_plain))
     if all_of_it < (LEAST_SUM * unit) ** 2:
         return False

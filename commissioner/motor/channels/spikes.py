@@ -1,4 +1,4 @@
-"""Single samples that stand out of a channel."""
+"""What a channel's samples hold that their neighbours do not tell: white noise, and single samples that stand out."""
 
 from __future__ import annotations
 
@@ -18,6 +18,13 @@ MOST_SPIKES = 0.005
 """Of the samples: more are another kind of signal."""
 LONE = np.array([1.0, -4.0, -4.0, 1.0]) / 6.0
 """Of a lone sample's height, by which the two before and the two behind it are off the cubic through their own neighbours."""
+
+
+def noise_of(x: Signal) -> float:
+    """Standard deviation of white noise from sixth differences, which no harmonic of the supply passes (robust)."""
+    d = np.diff(x, 6)
+    d = d[np.isfinite(d)]
+    return float(np.median(np.abs(d)) / 0.6745 / np.sqrt(924.0)) if d.size else 0.0
 
 
 def without_spikes(x: Signal) -> tuple[Signal, int]:

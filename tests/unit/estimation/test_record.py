@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.checks import MONITORED_RATE, MONITORED_S, noise_of
+from commissioner.estimation.checks import MONITORED_RATE, MONITORED_S
 from commissioner.estimation.record import OPENING_S, STATES, between, negative_sequence, prepare
 from commissioner.monitor.intake import clock
+from commissioner.motor.channels.spikes import noise_of
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, stator_impedance
 from commissioner.records import RunningRecording
