@@ -21,14 +21,19 @@ from commissioner.running.search import Found
 FORMAT = "commissioner extended running model 1"
 
 
+LOAD, STEPS = 0.1, ((1.0, 0.4), (2.0, 0.4))
+"""Of rated torque, from the start, and (s after closing, added): the scenario's course."""
+
+
 class RunningScenario(TypedDict):
-    """The simulator's document: Gamma circuit, mains, a start with load steps (s, N m), noise, the causes' sizes."""
+    """The simulator's document: Gamma circuit, mains, a start with load steps (s, N m) and what pulsates (share of the load, times a turn), noise, the
+    causes' sizes."""
 
     kind: str
     nameplate: Plate
     machine: dict[str, float]
     supply: dict[str, float]
-    course: dict[str, float | list[list[float]]]
+    course: dict[str, float | list[float] | list[list[float]]]
     sensors: dict[str, float]
     effects: dict[str, Entry]
 
@@ -92,12 +97,22 @@ def scenario(found: Found, record: Record) -> RunningScenario:
         },
         "supply": {"voltage_v": plate.rated_voltage_v, "frequency_hz": plate.rated_frequency_hz, "unbalance": 0.005, "fifth": 0.005},
         "course": {
-            "duration_s": 3.0, "rate_hz": 1.0 / record.period_s, "constant_nm": 0.1 * scales.torque_nm,
-            "steps": [[1.0, 0.4 * scales.torque_nm], [2.0, 0.4 * scales.torque_nm]],
+            "duration_s": 3.0, "rate_hz": 1.0 / record.period_s, "constant_nm": LOAD * scales.torque_nm,
+            "steps": [[at_s, added * scales.torque_nm] for at_s, added in STEPS],
+            **_swing(found, values),
         },
         "sensors": {"current_noise_a": record.sigma_a[0], "voltage_noise_v": record.sigma_v},
         "effects": effects,
     }  # fmt: skip
+
+
+def _swing(found: Found, values: Mapping[str, float]) -> dict[str, list[float]]:
+    """What pulsates in the load, as a share of the heaviest one."""
+    for one in found.accepted:
+        if (swing := CATALOGUE[one.cause].swing) is not None:
+            part, turns = swing(values)
+            return {"swing": [part / (LOAD + sum(added for _, added in STEPS)), turns]}
+    return {}
 
 
 def machine_of(document: Mapping[str, Any], *, is_plain: bool) -> tuple[Machine, Scales, Nameplate]:

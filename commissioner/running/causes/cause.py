@@ -48,7 +48,7 @@ class Cause:
     `allows`: what else physics demands of its numbers. `leaves_open`: a sentence on what no data tell of the parameters beside it, the channel
     or the line that differs from the mean being one alone. `is_sized_by_law`: whether a recording tells its sizes by the form of its law, which
     is not known, so that they have what `by_laws` says in their errors. `scenario`: entry of [effects] in the simulator; derivatives are those of
-    the kernel's lines, exact by complex step. `goes_by`: whose its numbers may be in this recording, the likeliest first, where not its own alone;
+    the kernel's lines, exact by complex step. `swing`: of its load instead, (amplitude over rated torque, times a turn of the shaft). `goes_by`: whose its numbers may be in this recording, the likeliest first, where not its own alone;
     `negative_sequence`: whether it adds a current of it, or makes the impedance there another than at slip.
     """
 
@@ -65,6 +65,7 @@ class Cause:
     range: tuple[float, float]
     confounders: tuple[Confounder, ...] = ()
     scenario: Callable[[Values, Scales], Entry] | None = None
+    swing: Callable[[Values], tuple[float, float]] | None = None
     needs: Callable[[Record], bool] = field(default=lambda _: True)
     is_of_measurement: bool = False
     allows: Callable[[Values, Scales], bool] = field(default=lambda _, __: True)

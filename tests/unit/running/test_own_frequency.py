@@ -8,10 +8,12 @@ import pytest
 
 from commissioner.estimation.fit import problem_of
 from commissioner.estimation.record import prepare
-from commissioner.running.diagnosis import diagnose
+from commissioner.running.diagnosis import Diagnosis, diagnose
+from commissioner.running.export import model_document
 from commissioner.running.nominal import nominal
 from commissioner.running.residual.swing_lines import swing_of
 from sim.motoring.machine import Scenario
+from sim.motoring.recording import build
 from tests.running_effects.cases import Case, taken
 
 SHARE, TURNS = 0.15, 1.618
@@ -22,11 +24,16 @@ def _case(seed: int, course: str, swing: tuple[float, float], *, has_speed: bool
     return replace(scenario, course=replace(scenario.course, swing=swing))
 
 
-def test_it_is_named_with_its_size_and_how_often_it_comes() -> None:
-    """A steady motor without a speed column: `unexplained`, 0.44 of the noise left."""
+@pytest.fixture(scope="module")
+def steady() -> tuple[Scenario, Diagnosis]:
+    """A steady motor without a speed column: `unexplained`, 0.44 of the noise left, before the cause had a name."""
     scenario = _case(2, "steady", (SHARE, TURNS), has_speed=False)
     recording, plate, _ = taken(scenario, 2)
-    seen = diagnose([recording], plate)
+    return scenario, diagnose([recording], plate)
+
+
+def test_it_is_named_with_its_size_and_how_often_it_comes(steady: tuple[Scenario, Diagnosis]) -> None:
+    scenario, seen = steady
     assert seen.verdict == "explained"
     (cause,) = seen.causes
     assert (cause.name, cause.equivalent) == ("load_ripple", ())
@@ -35,6 +42,20 @@ def test_it_is_named_with_its_size_and_how_often_it_comes() -> None:
     assert abs(times[0] - TURNS) < 3.0 * times[1] < 0.01
     assert times[2] == "a turn"
     assert any(remark.startswith("The load pulsates at 39.") and "1.61" in remark for remark in seen.remarks)
+
+
+def test_the_simulator_plays_it_from_the_extended_model(steady: tuple[Scenario, Diagnosis]) -> None:
+    """Its speed pulsates as much: of torque and inertia a steady motor tells little more than their ratio."""
+    scenario, seen = steady
+    assert seen.found is not None
+    assert seen.record is not None
+    drawn = build(dict(model_document(seen.found, seen.record)["scenario"]))
+    load_nm = drawn.course.constant_nm + sum(added for _, added in drawn.course.steps)
+    share, times = drawn.course.swing
+    assert share * load_nm / drawn.machine.inertia_kg_m2 == pytest.approx(
+        SHARE * scenario.course.constant_nm / scenario.machine.inertia_kg_m2, rel=0.05
+    )
+    assert times == pytest.approx(TURNS, abs=0.01)
 
 
 @pytest.mark.parametrize(("seed", "turns"), [(3, 0.37), (12, 2.37)])

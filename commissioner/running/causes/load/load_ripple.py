@@ -8,14 +8,14 @@ from commissioner.estimation.numbers import Scales
 from commissioner.running.causes.cause import Cause, Confounder, Form, Sizes, Values
 
 
+def _swing(v: Values) -> tuple[float, float]:
+    return math.hypot(v["load_swing_cos"], v["load_swing_sin"]), v["load_swing_turns"]
+
+
 def _sizes(v: Values, s: Scales) -> Sizes:
     """Amplitude of the torque, and how often it comes."""
-    part = math.hypot(v["load_swing_cos"], v["load_swing_sin"])
-    return {
-        "torque_nm": (part * s.torque_nm, "Nm"),
-        "of_rated_torque": (part, ""),
-        "times_a_turn": (v["load_swing_turns"], "a turn"),
-    }
+    part, turns = _swing(v)
+    return {"torque_nm": (part * s.torque_nm, "Nm"), "of_rated_torque": (part, ""), "times_a_turn": (turns, "a turn")}
 
 
 CAUSE = Cause(
@@ -30,6 +30,7 @@ CAUSE = Cause(
     forms=(Form("", ("load_swing_cos", "load_swing_sin"), ("load_swing_turns",), is_signed=True),),
     sizes=_sizes,
     range=(0.0, 50.0 * 1e3),
+    swing=_swing,
     needs=lambda record: not record.has_speed,
     leaves_open=lambda _: (
         "The load's pulsation has one amplitude for all of the recording; where it grows with the load, what it has more may be in the load's own "
