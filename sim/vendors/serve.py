@@ -1,4 +1,4 @@
-"""`python -m sim.vendors.serve NAME`: an ordinary drive on Modbus TCP, its keypad on standard input, its answer key at the end.
+"""`python -m sim.vendors.serve NAME`: an ordinary drive on Modbus TCP or RTU, its keypad on standard input, its answer key at the end.
 
 Keypad: a line each of `tune`, `remote`, `off-on`. Serves until SIGTERM.
 """
@@ -11,19 +11,23 @@ import os
 import selectors
 import signal
 import socket
-import struct
 import sys
 import time
 
 from sim.vendors.drive import TUNINGS, Habits, VendorDrive
 from sim.vendors.face import faces, read_face
+from sim.vendors.lines import RtuLine, TcpLine
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Exit code 0; 2 for a name there is no file of."""
+    """Exit code 0; 2 for a name there is no file of; 5 where port or device cannot be had."""
     parser = argparse.ArgumentParser(prog="python -m sim.vendors.serve", description=__doc__)
     parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(faces())}, or the path of a file")
     parser.add_argument("--tcp", type=int, default=0, metavar="PORT", help="0 = any free port")
+    parser.add_argument("--rtu", metavar="PATH", help="serve Modbus RTU instead, on a serial device or `pty`")
+    parser.add_argument("--baud", type=int, default=19200, help="of --rtu")
+    parser.add_argument("--parity", choices="NEO", default="N", help="of --rtu: none, even, odd")
+    parser.add_argument("--device", type=int, default=1, help="of --rtu: the drive's number")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--tuning", action="append", choices=TUNINGS, help="how the tunings go, in turn")
     parser.add_argument("--tuning-s", type=float, default=4.0)
@@ -41,26 +45,40 @@ def main(arguments: list[str] | None = None) -> int:
     )  # fmt: skip
     face = read_face(options.name)
     drive = VendorDrive(face, time.monotonic, habits=habits, seed=options.seed)
-    _serve(drive, options.tcp, face.turnaround_s if options.turnaround is None else options.turnaround)
+    turnaround_s = face.turnaround_s if options.turnaround is None else options.turnaround
+    try:
+        way_in = (
+            RtuLine(options.rtu, options.baud, options.parity, options.device)
+            if options.rtu
+            else socket.create_server(("127.0.0.1", options.tcp))
+        )
+    except OSError as error:
+        sys.stderr.write(f"sim: {error}\n")
+        return 5
+    _serve(drive, way_in, turnaround_s)
     sys.stdout.write(json.dumps(drive.truth()) + "\n")
     return 0
 
 
-def _serve(drive: VendorDrive, port: int, turnaround_s: float) -> None:
+def _serve(drive: VendorDrive, way_in: socket.socket | RtuLine, turnaround_s: float) -> None:
     stopped: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopped.append(1))
-    listener = socket.create_server(("127.0.0.1", port))
-    sys.stdout.write(f"listening tcp 127.0.0.1:{listener.getsockname()[1]}\n")
-    sys.stdout.flush()
     with selectors.SelectSelector() as ready:  # takes /dev/null and files too, which epoll refuses
-        ready.register(listener, selectors.EVENT_READ, "new")
+        if isinstance(way_in, RtuLine):
+            ready.register(way_in, selectors.EVENT_READ, "line")
+            where = f"rtu {way_in.address}"
+        else:
+            ready.register(way_in, selectors.EVENT_READ, "new")
+            where = f"tcp 127.0.0.1:{way_in.getsockname()[1]}"
+        sys.stdout.write(f"listening {where}\n")
+        sys.stdout.flush()
         if _has_keypad():
             ready.register(sys.stdin, selectors.EVENT_READ, "key")
         while not stopped:
             for key, _ in ready.select(0.05):
-                _one(drive, ready, key, listener, turnaround_s)
-    listener.close()
+                _one(drive, ready, key, turnaround_s)
+    way_in.close()
 
 
 def _has_keypad() -> bool:
@@ -70,28 +88,21 @@ def _has_keypad() -> bool:
     return not sys.stdin.isatty() or not hasattr(os, "tcgetpgrp") or os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
 
 
-def _one(
-    drive: VendorDrive,
-    ready: selectors.BaseSelector,
-    key: selectors.SelectorKey,
-    listener: socket.socket,
-    turnaround_s: float,
-) -> None:
+def _one(drive: VendorDrive, ready: selectors.BaseSelector, key: selectors.SelectorKey, turnaround_s: float) -> None:
+    where = key.fileobj
     if key.data == "new":
-        line, _ = listener.accept()
-        line.settimeout(2.0)
-        ready.register(line, selectors.EVENT_READ, "line")
+        assert isinstance(where, socket.socket)
+        ready.register(TcpLine(where.accept()[0]), selectors.EVENT_READ, "line")
     elif key.data == "key":
         text = sys.stdin.readline()
         if not text:
             ready.unregister(sys.stdin)
         press(drive, text.strip())
     else:
-        line = key.fileobj
-        assert isinstance(line, socket.socket)
-        if not _answer(drive, line, turnaround_s):
-            ready.unregister(line)
-            line.close()
+        assert isinstance(where, TcpLine | RtuLine)
+        if not where.serve(drive.answer, turnaround_s):
+            ready.unregister(where)
+            where.close()
 
 
 def press(drive: VendorDrive, key: str) -> None:
@@ -99,30 +110,6 @@ def press(drive: VendorDrive, key: str) -> None:
     actions = {"tune": drive.press_tune, "remote": drive.press_remote, "off-on": drive.power_cycle}
     if key in actions:
         actions[key]()
-
-
-def _answer(drive: VendorDrive, line: socket.socket, turnaround_s: float) -> bool:
-    """False where the other end has gone."""
-    try:
-        header = _take(line, 7)
-        number, _, length, unit = struct.unpack(">HHHB", header)
-        reply = drive.answer(_take(line, length - 1))
-        time.sleep(turnaround_s)
-        if reply is not None:
-            line.sendall(struct.pack(">HHHB", number, 0, len(reply) + 1, unit) + reply)
-    except (OSError, EOFError, struct.error):
-        return False
-    return True
-
-
-def _take(line: socket.socket, count: int) -> bytes:
-    data = b""
-    while len(data) < count:
-        piece = line.recv(count - len(data))
-        if not piece:
-            raise EOFError
-        data += piece
-    return data
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The emulated vendors: each wears the face of its file, and behaves behind it as its family does."""
 
+import os
 import socket
 import struct
 import time
@@ -8,6 +9,7 @@ import pytest
 
 from sim.vendors.drive import BAD_ADDRESS, BAD_FUNCTION, BAD_VALUE, Habits, VendorDrive
 from sim.vendors.face import faces, read_face
+from sim.vendors.lines import SILENCE_S, RtuLine
 from tests.support.vendor_process import MADE_UP, Vendor
 
 MAILBOX, LOCKED = MADE_UP
@@ -218,3 +220,30 @@ def test_an_answer_takes_the_turnaround_of_the_file_unless_told_otherwise():
 
     assert took(None) >= read_face("yaskawa_a1000").turnaround_s
     assert took(0.0) < 0.05
+
+
+def test_a_serial_line_answers_its_own_number_and_whole_requests_alone():
+    """By what a terminal's other end hears: a request in two pieces, one damaged, one to another drive, one to all, half of one."""
+    drive, _ = drive_of("yaskawa_a1000")
+    line = RtuLine("pty", 115200, "N", 7)
+    master = os.open(line.address, os.O_RDWR | os.O_NONBLOCK | os.O_NOCTTY)
+
+    def said_to(*pieces):
+        for piece in pieces:
+            os.write(master, piece)
+            line.serve(drive.answer, 0.0)
+        try:
+            return os.read(master, 64)
+        except BlockingIOError:
+            return b""
+
+    request = bytes.fromhex("07030020000185a6")
+    answer = said_to(request[:3], request[3:])
+    assert answer[:3] == bytes.fromhex("070302") and len(answer) == 7
+    assert said_to(request[:-1] + b"\0") == b""
+    assert said_to(bytes.fromhex("080300200001") + bytes.fromhex("8559")) == b""
+    assert said_to(request[:4]) == b""
+    time.sleep(2 * SILENCE_S)
+    assert said_to(request) == answer
+    os.close(master)
+    line.close()

@@ -11,6 +11,8 @@ from types import TracebackType
 from typing import Any
 
 FOLDER = Path(__file__).parents[1] / "data" / "vendors"
+BAUD = "115200"
+"""Of a serial line."""
 MADE_UP = tuple(str(FOLDER / f"{name}.toml") for name in ("behind_a_mailbox", "needs_an_unlock"))
 """Drives that nobody sells, which wear what no file of config/drives has a source for."""
 DRIVES = """
@@ -34,7 +36,7 @@ class Vendor:
 
     def __init__(self, *arguments: str, turnaround_s: float | None = 0.004) -> None:
         quick = [] if turnaround_s is None else ["--turnaround", str(turnaround_s)]
-        self._command = [sys.executable, "-m", "sim.vendors.serve", *quick, *arguments]
+        self._command = [sys.executable, "-m", "sim.vendors.serve", *quick, "--baud", BAUD, *arguments]
         self.truth: dict[str, Any] = {}
 
     def __enter__(self) -> Vendor:
@@ -42,7 +44,8 @@ class Vendor:
             self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
         )
         assert self.process.stdout is not None
-        self.url = f"tcp://{self.process.stdout.readline().split()[2]}"
+        _, kind, address = self.process.stdout.readline().split()
+        self.url = f"{kind}://{address}" + (f"?parity=N&baud={BAUD}" if kind == "rtu" else "")
         return self
 
     def press(self, key: str) -> None:

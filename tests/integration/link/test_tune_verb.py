@@ -40,7 +40,8 @@ def test_an_ordinary_drive_serves_without_a_keypad():
 
 
 def test_a_remote_tuning_is_kept_and_taken_back_by_restore(tmp_path):
-    with Vendor("schneider_atv340", "--tuning-s", "0.6") as drive:
+    """Over a serial line, as most drives of this kind are spoken to; the others here over TCP."""
+    with Vendor("schneider_atv340", "--tuning-s", "0.6", "--rtu", "pty") as drive:
         answer = tune(drive, tmp_path, "--hardwired-stop", "--write-back")
         exported = call(
             "runs", "export", "last", str(tmp_path / "p.json"), "--form", "json", "--runs", str(tmp_path), "--json"
