@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,9 +58,16 @@ class Paced:
 
 
 def commissioned(
-    runs: Path, pace: Pace, scenario: str = "default", seed: int = 1, axes=None, faults=(), connection: str = "star"
+    runs: Path,
+    pace: Pace,
+    scenario: str = "default",
+    seed: int = 1,
+    axes=None,
+    faults=(),
+    connection: str = "star",
+    seconds: float | None = None,
 ) -> Paced:
-    """`axes`: None takes the procedure's; `connection`: the plate's."""
+    """`axes`, `seconds` of tones along each: None takes the procedure's; `connection`: the plate's."""
     drawn = load(scenario)
     station, profile = Station(drawn, seed, faults, pace), load_profile("simulated")
     plate = Nameplate(**{name: getattr(drawn.plant.nameplate, name) for name in PLATE}, connection=connection)
@@ -72,6 +79,8 @@ def commissioned(
         sleep=station.pass_time, clock=lambda: station.now_s,
     )  # fmt: skip
     plan = load_procedure(None, axes_deg=axes)
+    if seconds is not None:
+        plan = replace(plan, excitation=replace(plan.excitation, seconds=seconds))
     findings = Findings()
     job = make_job(profile, plate, plan, port, write_back=True, now_s=inverter.now_s)
     folder.save("request.json", {"profile": profile.file})

@@ -29,9 +29,13 @@ NAMES = {
 
 
 def _job(axes=(0.0,), write_back=True, **limits) -> Job:
+    """Two seconds of tones along each axis."""
     plan = load_procedure(axes_deg=axes)
     plan = replace(
-        plan, supervision=replace(plan.supervision, standstill_dwell_s=0.06), limits=replace(plan.limits, **limits)
+        plan,
+        excitation=replace(plan.excitation, seconds=2.0),
+        supervision=replace(plan.supervision, standstill_dwell_s=0.06),
+        limits=replace(plan.limits, **limits),
     )
     return Job(plan, load_motor("motor_2kw2"), DriveLimits(480.0, 640.0, 85.0, 120.0), NAMES, write_back, 0.005)
 
@@ -115,10 +119,10 @@ def test_each_test_ends_on_a_dc_bias_that_comes_after_the_tones_have_gone_down(g
 
 
 def test_estimates_are_told_ten_times_a_second_and_settle(good_run):
-    _, drive, _, _ = good_run
+    _, drive, _, job = good_run
     estimates = _told(drive, EstimateUpdated)
     axis = [e for e in estimates if e.axis_deg == 60.0]
-    assert len(axis) >= 8 * 4.6
+    assert len(axis) >= 8 * job.plan.excitation.seconds
     assert axis[-1].parameters[0] == pytest.approx(drive.machine.r_s, rel=0.01)
     assert [f.has_settled for f in _told(drive, AxisFinished)][1:] == [True, True, True]
 
