@@ -52,6 +52,11 @@ EXPLAINED = {
         "most_s / OTHER_TIME <",
     ): "rounded numbers would have to be equal",
     (
+        "commissioner.safety.freshness",
+        "began_after_s <= self._began_after_s(sent_s)",
+    ): "the same age, told again by another answer",
+    ("commissioner.safety.freshness", ": 0 -> -1"): "no drive has made fewer samples than none",
+    (
         "commissioner.safety.watch",
         "-(block.current_u_a + block.current_v_a)",
     ): "the same: only the magnitude of the third phase is looked at",

@@ -15,6 +15,10 @@ def test_a_sample_is_as_old_as_it_can_be_since_the_drive_was_asked_to_begin():
     assert BEGAN.age_s(samples=0, now_s=100.5) == pytest.approx(0.5 + LOOSENS * 0.5)
 
 
+def test_nothing_is_old_as_a_session_begins():
+    assert BEGAN.age_s(samples=0, now_s=100.0) == 0.0
+
+
 def test_no_age_is_negative():
     assert BEGAN.age_s(samples=200, now_s=100.5) == 0.0
     assert BEGAN.age_s(samples=52, now_s=100.5) == 0.0
@@ -56,6 +60,7 @@ def test_what_can_be_there_is_of_the_drives_time():
     fast = replace(QUARTER, rate=4.0, told_s=100.0)
     assert fast.most_made(101.0) == pytest.approx((1.0 + LOOSENS) * 32.0)
     assert fast.most_made(99.0) == 0.0
+    assert replace(fast, told_s=102.0).most_made(101.0) == 32.0  # an answer says no more of the time before it
 
 
 def test_a_clock_does_not_change():
