@@ -6,6 +6,9 @@ const css = (name) => getComputedStyle(document.documentElement).getPropertyValu
 const times = points.map((point) => Date.parse(point.utc) / 1000);
 const day =
   times.at(-1) - times[0] > 3 * 86400 ? (utc) => utc.slice(0, 10) : (utc) => utc.slice(5, 16).replace("T", " ");
+/* Places of a tick: as many as the step to the next one has. */
+const placesOf = (step) =>
+  [0, 1, 2, 3, 4, 5].find((n) => Math.abs(step * 10 ** n - Math.round(step * 10 ** n)) < 1e-6) ?? 6;
 
 for (const element of document.querySelectorAll("[data-trend]")) {
   const factor = Number(element.dataset.factor),
@@ -53,7 +56,7 @@ for (const element of document.querySelectorAll("[data-trend]")) {
       },
       axes: [
         { ...axis, size: 28, space: 90, values: (u, at) => at.map((t) => day(new Date(1000 * t).toISOString())) },
-        { ...axis, size: 56, values: (u, at) => at.map((v) => number(v, v < 10 ? 3 : v < 100 ? 2 : 1)) },
+        { ...axis, size: 56, values: (u, at, index, space, step) => at.map((v) => number(v, placesOf(step))) },
       ],
       series: [{}, { stroke: "transparent", width: 0, points: { show: false } }],
       hooks: { draw: [marks] },
