@@ -8,7 +8,7 @@ import struct
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from functools import partial
 
 Answer = Callable[[bytes], bytes | None]
 """A drive's PDU to a request's; None where it says nothing."""
@@ -18,20 +18,8 @@ BITS = 11
 """Of a character, with parity or a second stop bit."""
 
 
-class Line(Protocol):
-    """What a request can come in by; a selector watches its `fileno`."""
-
-    def fileno(self) -> int: ...
-
-    def serve(self, answer: Answer, turnaround_s: float) -> bool:
-        """What has come is answered, so long after. False where the other end has gone."""
-        ...
-
-    def close(self) -> None: ...
-
-
 class TcpLine:
-    """A client of Modbus TCP."""
+    """A client of Modbus TCP. A selector watches `fileno`."""
 
     def __init__(self, connection: socket.socket) -> None:
         connection.settimeout(2.0)
@@ -40,6 +28,7 @@ class TcpLine:
         self.close = connection.close
 
     def serve(self, answer: Answer, turnaround_s: float) -> bool:
+        """What has come is answered, so long after. False where the other end has gone."""
         try:
             number, _, length, unit = struct.unpack(">HHHB", self._take(7))
             reply = answer(self._take(length - 1))
@@ -73,32 +62,40 @@ class RtuLine:
         if path == "pty":
             import tty  # pseudo terminals are POSIX's
 
-            self._descriptor, self._slave = os.openpty()
-            tty.setraw(self._slave)
-            self.address = os.ttyname(self._slave)
+            self._descriptor, other = os.openpty()  # held open: it has not gone while nobody speaks
+            tty.setraw(other)
+            self.address, self._shut = os.ttyname(other), partial(os.close, self._descriptor)
         else:
             import serial
 
-            self._port: Any = serial.Serial(path, baud, parity=parity, stopbits=1 if parity != "N" else 2, timeout=0)
-            self._descriptor, self.address = self._port.fileno(), path
+            port = serial.Serial(path, baud, parity=parity, stopbits=1 if parity != "N" else 2, timeout=0)
+            self._descriptor, self.address, self._shut = port.fileno(), path, port.close
 
     def fileno(self) -> int:
         return self._descriptor
 
     def serve(self, answer: Answer, turnaround_s: float) -> bool:
+        """The same. False where the adapter has gone."""
         now = time.monotonic()
         if now - self._heard_s > SILENCE_S:
             self._begun = b""
         self._heard_s = now
-        self._begun += os.read(self._descriptor, 512)
-        for frame in self._whole():
-            if frame[0] in (0, self._device) and _crc(frame) == b"\0\0":
-                reply = answer(frame[1:-2])
-                if reply is not None and frame[0]:
-                    said = bytes([frame[0]]) + reply
-                    time.sleep(turnaround_s + (len(said) + 2) * self._character_s)
-                    os.write(self._descriptor, said + _crc(said))
-        return True
+        try:
+            heard = os.read(self._descriptor, 512)
+            self._begun += heard
+            for frame in self._whole():
+                if frame[0] in (0, self._device) and _crc(frame) == b"\0\0":
+                    self._say(frame[0], answer(frame[1:-2]), turnaround_s)
+        except OSError:
+            return False
+        return bool(heard)
+
+    def _say(self, device: int, reply: bytes | None, turnaround_s: float) -> None:
+        """Nothing to a request to all."""
+        if reply is not None and device:
+            said = bytes([device]) + reply
+            time.sleep(turnaround_s + (len(said) + 2) * self._character_s)
+            os.write(self._descriptor, said + _crc(said))
 
     def _whole(self) -> Iterator[bytes]:
         while len(self._begun) > 1 and len(self._begun) >= (count := _length(self._begun)):
@@ -106,7 +103,9 @@ class RtuLine:
             yield frame
 
     def close(self) -> None:
-        os.close(self._descriptor)
+        if self._descriptor >= 0:
+            self._shut()
+        self._descriptor = -1
 
 
 def _length(begun: bytes) -> int:

@@ -75,7 +75,7 @@ def _serve(drive: VendorDrive, way_in: socket.socket | RtuLine, turnaround_s: fl
         sys.stdout.flush()
         if _has_keypad():
             ready.register(sys.stdin, selectors.EVENT_READ, "key")
-        while not stopped:
+        while not stopped and way_in.fileno() >= 0:  # an adapter may be unplugged
             for key, _ in ready.select(0.05):
                 _one(drive, ready, key, turnaround_s)
     way_in.close()

@@ -247,3 +247,5 @@ def test_a_serial_line_answers_its_own_number_and_whole_requests_alone():
     assert said_to(request) == answer
     os.close(master)
     line.close()
+    assert not line.serve(drive.answer, 0.0)
+    assert line.fileno() < 0
