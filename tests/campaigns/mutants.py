@@ -55,7 +55,7 @@ EXPLAINED = {
         "commissioner.safety.freshness",
         "began_after_s <= self._began_after_s(sent_s)",
     ): "the same age, told again by another answer",
-    ("commissioner.safety.freshness", ": 0 -> -1"): "no drive has made fewer samples than none",
+    ("commissioner.safety.freshness", "made: int = 0"): "no drive has made fewer samples than none",
     (
         "commissioner.safety.watch",
         "-(block.current_u_a + block.current_v_a)",
