@@ -179,10 +179,10 @@ def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> 
 
 
 def _more_numbers(found: Found, name: str, rival: str) -> float:
-    """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, where it can only imitate: a drift that
-    has settled at once, a sensor's bend that has.
+    """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, or fewer, where one of the two can only imitate the
+    other: a drift that has settled at once, a sensor's bend that has.
     """
-    if name not in CATALOGUE[rival].imitates:
+    if name not in CATALOGUE[rival].imitates and rival not in CATALOGUE[name].imitates:
         return 0.0
     mine = sum(t.effect == name for t in found.fit.model.terms)
     return float(np.log(found.fit.normal.count.sum())) * (len(CATALOGUE[rival].terms(found.setting)) - mine)
