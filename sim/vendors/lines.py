@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from sim.wire.crc import crc_bytes
+
 Answer = Callable[[bytes], bytes | None]
 """A drive's PDU to a request's; None where it says nothing."""
 SILENCE_S = 0.05
@@ -84,7 +86,7 @@ class RtuLine:
             heard = os.read(self._descriptor, 512)
             self._begun += heard
             for frame in self._whole():
-                if frame[0] in (0, self._device) and _crc(frame) == b"\0\0":
+                if frame[0] in (0, self._device) and crc_bytes(frame) == b"\0\0":
                     self._say(frame[0], answer(frame[1:-2]), turnaround_s)
         except OSError:
             return False
@@ -95,7 +97,7 @@ class RtuLine:
         if reply is not None and device:
             said = bytes([device]) + reply
             time.sleep(turnaround_s + (len(said) + 2) * self._character_s)
-            os.write(self._descriptor, said + _crc(said))
+            os.write(self._descriptor, said + crc_bytes(said))
 
     def _whole(self) -> Iterator[bytes]:
         while len(self._begun) > 1 and len(self._begun) >= (count := _length(self._begun)):
@@ -116,13 +118,3 @@ def _length(begun: bytes) -> int:
     if function == 23:
         return 13 + begun[10] if len(begun) > 10 else 14
     return {17: 4, 43: 7}.get(function, 8)
-
-
-def _crc(body: bytes) -> bytes:
-    """CRC-16/MODBUS, low byte first; of a frame with its own, zero."""
-    crc = 0xFFFF
-    for byte in body:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
-    return crc.to_bytes(2, "little")

@@ -16,6 +16,7 @@ from pymodbus.pdu import ExceptionResponse
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusTlsServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 
+from sim.wire.crc import crc_bytes
 from sim.wire.faults import SERVER, TARGET_FAILED, WIRE, Fault, deliver
 from sim.wire.pace import Pace
 from sim.wire.station import Drive, Options, sim_device
@@ -155,7 +156,7 @@ class Handler(ServerRequestHandler):
     def _rebuild(self, frame: bytes) -> Callable[[bytes], bytes]:
         if not self.line.is_rtu:
             return lambda body: frame[:4] + len(body).to_bytes(2, "big") + body
-        return lambda body: body + _crc_bytes(body)
+        return lambda body: body + crc_bytes(body)
 
     def _put(self, data: bytes, begin: float) -> None:
         pace = self.line.pace
@@ -168,16 +169,6 @@ class Handler(ServerRequestHandler):
     def _write(self, data: bytes) -> None:
         if self.transport and not self.transport.is_closing():
             self.transport.write(data)
-
-
-def _crc_bytes(body: bytes) -> bytes:
-    """CRC-16/MODBUS of a frame, low byte first as RTU sends it."""
-    crc = 0xFFFF
-    for byte in body:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
-    return crc.to_bytes(2, "little")
 
 
 class Line:

@@ -10,6 +10,7 @@ import pytest
 from sim.vendors.drive import BAD_ADDRESS, BAD_FUNCTION, BAD_VALUE, Habits, VendorDrive
 from sim.vendors.face import faces, read_face
 from sim.vendors.lines import SILENCE_S, RtuLine
+from sim.wire.crc import crc_bytes
 from tests.support.vendor_process import MADE_UP, Vendor
 
 MAILBOX, LOCKED = MADE_UP
@@ -242,6 +243,8 @@ def test_a_serial_line_answers_its_own_number_and_whole_requests_alone():
     assert answer[:3] == bytes.fromhex("070302") and len(answer) == 7
     assert said_to(request[:-1] + b"\0") == b""
     assert said_to(bytes.fromhex("080300200001") + bytes.fromhex("8559")) == b""
+    to_all = bytes.fromhex("000300200001")
+    assert said_to(to_all + crc_bytes(to_all)) == b""
     assert said_to(request[:4]) == b""
     time.sleep(2 * SILENCE_S)
     assert said_to(request) == answer
