@@ -13,12 +13,12 @@ from commissioner.conformance.records import (
     NotTested,
     Outcome,
     Reply,
-    Rule,
     RuleResult,
     Steps,
     T,
     Wait,
 )
+from commissioner.conformance.registry import Rule
 
 KEPT = 4
 """Exchanges shown with a result: the deciding one and what led to it."""

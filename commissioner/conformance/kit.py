@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from commissioner.conformance.drive import Drive
 from commissioner.conformance.judge import Recorder, judge
 from commissioner.conformance.line import Line
-from commissioner.conformance.records import Broken, Outcome, Rule, RuleResult, Steps
+from commissioner.conformance.records import Broken, Outcome, RuleResult, Steps
+from commissioner.conformance.registry import Rule
 from commissioner.conformance.rules import RULES
 from commissioner.conformance.rules.stopping import VITAL
 from commissioner.errors import CheckFailed, ReplyTimeout, UsageError

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, TypeVar
-
-if TYPE_CHECKING:
-    from commissioner.conformance.drive import Drive
+from typing import TypeVar
 
 Words = tuple[int, ...]
 
@@ -58,17 +55,6 @@ class Outcome(Enum):
     PASS = "pass"
     FAIL = "fail"
     NOT_TESTED = "not tested"
-
-
-@dataclass(frozen=True)
-class Rule:
-    """`name` is what a report and a script hold on to; `claim` what a conforming drive does; `source` where it is asked for."""
-
-    name: str
-    claim: str
-    source: str
-    energises: bool
-    steps: Callable[[Drive], Steps[None]]
 
 
 @dataclass(frozen=True)

@@ -8,22 +8,17 @@ from functools import partial
 
 import numpy as np
 
-from commissioner.diagnose.causes import CATALOGUE, LINEAR
-from commissioner.diagnose.causes.inverter.legs import tail_of_legs
 from commissioner.diagnose.contract import NextExperiment
 from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.diagnose.export.model_file import model_document
 from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
-from commissioner.diagnose.fit.gauss_newton import Fit
-from commissioner.diagnose.fit.spread import covariance_of
 from commissioner.diagnose.intake.audit import Audit, prepare
 from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
 from commissioner.diagnose.intake.refusal import refused
-from commissioner.diagnose.plant.model import Layout
 from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.journal import Said, Step, followed, replayed
-from commissioner.diagnose.search.search import Found, search
+from commissioner.diagnose.search.search import Found, not_told_apart, search
 from commissioner.diagnose.verdict.causes import (
     Cause,
     causes_of,
@@ -33,6 +28,7 @@ from commissioner.diagnose.verdict.causes import (
 from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
 from commissioner.diagnose.verdict.experiment import next_experiment
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
+from commissioner.diagnose.verdict.parameters import parameters_of
 from commissioner.errors import DataRefused
 from commissioner.estimation.cancelling import TimeOver, given_up_by
 from commissioner.identify.estimate.sufficiency import WORST_RELATIVE_STD
@@ -110,7 +106,7 @@ def diagnose(
         report(step)
 
     heard(Said(f"noise {'' if noise.is_known else 'at most '}{rms_a * 1e3:.3g} mA rms, from {noise.source}"))
-    excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
+    excluded = (*excluded, *not_told_apart(len(audit.excited_hz)))
     try:
         check = partial(check_before_search, noise=noise)
         with given_up_by(go_on):
@@ -172,7 +168,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         causes, lack, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
     )
     experiment = next_experiment(verdict, causes, record)
-    after = _parameters(found.fit, layout)
+    after = parameters_of(found.fit, layout)
     return Diagnosis(
         verdict,
         reason,
@@ -182,7 +178,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         noise,
         held,
         lack,
-        _parameters(found.nominal, layout),
+        parameters_of(found.nominal, layout),
         after,
         experiment,
         model_document(found, [*causes, *unsure]),
@@ -233,19 +229,6 @@ def _verdict(
     return "explained", "The named causes leave nothing above the noise."
 
 
-def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:
-    """Of slow currents, as a drive controls them: what bars displace at the tones is the cause's, not R_R's and L_sigma's."""
-    values, derivatives = one.model.at_rest(layout)
-    covariance = derivatives @ covariance_of(one, layout) @ derivatives.T
-    spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    spreads[0] = np.hypot(spreads[0], tail_of_legs(one.model, layout)[1])
-    out = {n: Quantity(float(v), float(s)) for n, v, s in zip(PARAMETERS, values, spreads, strict=True)}
-    shares = np.array([0.0, -1.0 / values[1], 0.0, 1.0 / values[3]])
-    t = float(values[3] / values[1])
-    out["rotor_time_constant_s"] = Quantity(t, t * float(np.sqrt(max(shares @ covariance @ shares, 0.0))))
-    return out
-
-
 def _not_fixed(parameters: Mapping[str, Quantity]) -> tuple[str, ...]:
     """The sentence on those of the four that `identify` would refuse to give; none where the excitation fixes all."""
     relative = {s: parameters[n].std / abs(parameters[n].value) for s, n in zip(SYMBOLS, PARAMETERS, strict=True)}
@@ -256,14 +239,6 @@ def _not_fixed(parameters: Mapping[str, Quantity]) -> tuple[str, ...]:
         f"The excitation does not fix {' and '.join(loose)}, limit {WORST_RELATIVE_STD:.0%}: record again with more current, "
         "and with more tones between the machine's poles.",
     )
-
-
-def _not_told_apart(lines: int) -> tuple[str, ...]:
-    """Two lines fit the four parameters exactly: what only shifts them, or jumps in delay, cannot be named then. (A sweep has none.)"""
-    if lines not in (1, 2):
-        return ()
-    late = [name for name, cause in CATALOGUE.items() if cause.moves_the_clock]
-    return LINEAR if lines == 2 else (*LINEAR, *late)
 
 
 def _remarks(noise: Noise, found: Found, unsure: Sequence[Cause]) -> tuple[str, ...]:

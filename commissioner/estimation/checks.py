@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
+from commissioner.estimation.window import Window
 from commissioner.motor.channels.clock import turn_a_row, wrong_unit
 from commissioner.motor.channels.faults import no_lines
 from commissioner.motor.channels.levels import current_level, voltage_level
 from commissioner.motor.channels.spikes import noise_of
 from commissioner.records import RunningRecording
-
-if TYPE_CHECKING:
-    from commissioner.estimation.record import Window
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

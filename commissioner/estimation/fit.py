@@ -17,8 +17,9 @@ from commissioner.estimation.kernels.whitening import whiten
 from commissioner.estimation.noise import Noise, plain_noise
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, LOGARITHMIC, NAMES, OF_ANGLE
 from commissioner.estimation.record import STATES as RECORD_STATES
-from commissioner.estimation.record import Record, Window, first_part
+from commissioner.estimation.record import Record
 from commissioner.estimation.told import Slopes, Told, told
+from commissioner.estimation.window import Window, first_part
 
 Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")

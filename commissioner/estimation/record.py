@@ -27,6 +27,7 @@ from commissioner.estimation.checks import (
     refused,
 )
 from commissioner.estimation.numbers import Scales
+from commissioner.estimation.window import Window, first_part, last_part, swept, turns_backwards
 from commissioner.motor import standing
 from commissioner.motor.channels.clock import off_mains
 from commissioner.motor.channels.faults import without_clipped
@@ -68,28 +69,6 @@ RENEWALS, RENEWED_TO = (1, 2), 0.02
 """Rows a carrier period where each has its own voltage, which an inverter renews once or twice a period; how near to that."""
 MOST_SAMPLES = 60_000
 """Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """`current` (n, 3: alpha, beta, zero); `voltage`, `speed` (2n - 1, 2) at samples and between; speed electrical and its slope."""
-
-    time_s: Array
-    current: Array
-    voltage: Array
-    speed: Array
-    state: NDArray[np.int64]
-    is_from_rest: bool
-
-    @property
-    def count(self) -> int:
-        """Samples."""
-        return int(self.time_s.size)
-
-    @property
-    def direction(self) -> float:
-        """In which the supply turns: 1 or -1."""
-        return -1.0 if _turns_backwards(self.voltage) else 1.0
 
 
 @dataclass(frozen=True)
@@ -189,7 +168,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
                 "exchange two current channels, or two voltages, with --map",
             )
         remarks += _of_open_phases(one, open_phases)
-        is_backwards = _turns_backwards(voltage)
+        is_backwards = turns_backwards(voltage)
         without |= {("uwv" if is_backwards else "uvw")[k] for k in range(3) if not np.isfinite(one.currents_a[k]).any()}
         if is_backwards:
             current, voltage = current * [1, -1, 1], voltage * [1, -1]
@@ -365,16 +344,6 @@ def _vector(x: Array) -> Array:
     return np.stack([(2 * u - v - w) / 3.0, (v - w) / np.sqrt(3.0), (u + v + w) / 3.0], axis=1)
 
 
-def _swept(voltage: Array) -> Array:
-    """Twice the area that the voltage's vector sweeps from each sample to the next, V^2: its sign is the supply's direction."""
-    v = voltage[:, 0] + 1j * voltage[:, 1]
-    return np.asarray(np.imag(np.conj(v[:-1]) * v[1:]))
-
-
-def _turns_backwards(voltage: Array) -> bool:
-    return bool(np.nansum(_swept(voltage)) < 0)
-
-
 def negative_sequence(voltage: Array) -> float:
     """Size of a voltage's negative sequence, V, whatever the supply's frequency does: z^2 / |z| rests at 1.5 of it (to first order)."""
     z = voltage[:, 0] + 1j * voltage[:, 1]
@@ -384,7 +353,7 @@ def negative_sequence(voltage: Array) -> float:
 
 def _turns_against(speed: Array, voltage: Array) -> bool:
     """Whether the shaft turns mostly in the direction opposite to the supply's, as a sensor of the other sign shows it."""
-    return bool(np.nansum(_swept(voltage) * speed[1:]) < 0)
+    return bool(np.nansum(swept(voltage) * speed[1:]) < 0)
 
 
 def _open_phases(one: RunningRecording, current: Array, scales: Scales) -> Bools:
@@ -515,22 +484,6 @@ def _behind_run_ups(
             f"{one.source}: begins in a start, at a speed that nothing tells: its first {first * one.sample_period_s:.2g} s are not used."
         )
     return tuple(out), said
-
-
-def last_part(w: Window, first: int) -> Window:
-    """The window from its sample `first` on."""
-    return replace(
-        w, time_s=w.time_s[first:] - w.time_s[first], current=w.current[first:], voltage=w.voltage[2 * first :], speed=w.speed[2 * first :],
-        state=w.state[first:],
-    )  # fmt: skip
-
-
-def first_part(w: Window, count: int) -> Window:
-    """The window's first samples."""
-    return replace(
-        w, time_s=w.time_s[:count], current=w.current[:count], voltage=w.voltage[: 2 * count - 1], speed=w.speed[: 2 * count - 1],
-        state=w.state[:count],
-    )  # fmt: skip
 
 
 def smoothed(x: Array, span_s: float, order: int, period: float) -> Array:

@@ -9,12 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from commissioner.errors import ConfigurationError, UsageError
-
-if TYPE_CHECKING:
-    from commissioner.registers.tuning import Tuning
+from commissioner.registers.tuning import Tuning
 
 WORDS_PER_ELEMENT = MappingProxyType({"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2, "ascii": 1})
 """Registers one element of a type takes; an ascii element is a register with two characters."""

@@ -32,7 +32,8 @@ from commissioner.estimation.hidden import at_small_slip, by_laws, drawn_aside, 
 from commissioner.estimation.kernels.march import SLOW2, SLOWEST2
 from commissioner.estimation.noisy_input import unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
-from commissioner.estimation.record import STATES, Record, first_part, prepare, scales_of
+from commissioner.estimation.record import STATES, Record, prepare, scales_of
+from commissioner.estimation.window import first_part
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.channels.clock import turn_a_row
 from commissioner.motor.channels.faults import currents_on_time

@@ -13,7 +13,8 @@ from commissioner.estimation.fit import Machine, Problem, columns_of, plain_mach
 from commissioner.estimation.held import best_reading
 from commissioner.estimation.kernels.march import STATES
 from commissioner.estimation.numbers import Scales
-from commissioner.estimation.record import Record, Window, between, prepare
+from commissioner.estimation.record import Record, between, prepare
+from commissioner.estimation.window import Window
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.nominal import RIPPLE

@@ -19,7 +19,8 @@ from commissioner.service import problems
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import HEADERS, Gate
 from commissioner.service.access.head import Heads
-from commissioner.service.access.visitors import check_role, visitor_of
+from commissioner.service.access.visitor import check_role
+from commissioner.service.access.visitors import visitor_of
 from commissioner.service.contract.description import describe_answers
 from commissioner.service.page import views
 from commissioner.service.page.frame import prepare, prepare_causes

@@ -9,7 +9,7 @@ from typing import Any
 from commissioner.service.access.accounts import Accounts
 from commissioner.service.access.sessions import Sessions
 from commissioner.service.access.throttle import Throttle
-from commissioner.service.access.visitors import Visitor
+from commissioner.service.access.visitor import Visitor
 from commissioner.service.archive import Archive
 from commissioner.service.audit import Audit
 from commissioner.service.configuration import Settings

@@ -17,7 +17,6 @@ from sim.drive.drive_map import DriveMap, Item
 from sim.drive.live import COUNTS_PER_LSB, crc16, run_interrupts
 from sim.drive.memory import Memory
 from sim.drive.parameters import ParameterSet
-from sim.drive.registers import Registers
 from sim.drive.samples import VOLTAGE_STEP_V, SampleRing, link_step_v
 from sim.drive.states import Setup, State, Trip
 from sim.physics import layout as at
@@ -69,7 +68,6 @@ class Firmware:
         self.before_command: Callable[[str], bool] = lambda command: False
         self.on_energised: list[Callable[[], None]] = []
         self.events: list[tuple[float, Callable[[], None]]] = []
-        self.registers = Registers(self)
         self._power_up()
 
     # --- power -----------------------------------------------------------------------------------------------

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.drive.claim import UNCOUNTED
 from sim.drive.drive_map import Item
+from sim.drive.firmware import Firmware
 from sim.drive.parameters import PARAMETERS
 from sim.drive.samples import VOLTAGE_STEP_V
 from sim.drive.states import Answer
 from sim.physics import layout as at
-
-if TYPE_CHECKING:
-    from sim.drive.firmware import Firmware
 
 NOT_NEGATIVE = (
     "scale_ramp_per_s",

@@ -18,6 +18,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from sim.drive.drive_map import DriveMap, load_map
 from sim.drive.firmware import Firmware, warm_up
 from sim.drive.memory import Memory
+from sim.drive.registers import Registers
 from sim.drive.states import Answer
 from sim.scenario import Scenario
 from sim.wire.faults import Plan, parse
@@ -82,6 +83,7 @@ class Drive:
             StateLog(options.state_log),
             time.monotonic if options.speed == 0.0 and not keeps_motor_time else None,
         )
+        self.registers = Registers(self.firmware)
         self.firmware.before_command = lambda command: self.plan.before_command(command, self.firmware)
         self.plan.arm(self.firmware)
         self.started = time.monotonic()
@@ -136,13 +138,13 @@ class Drive:
             self.fill_window(count)
         else:
             self.pass_time()
-        return self.firmware.registers.read(address, count)
+        return self.registers.read(address, count)
 
     def write(self, address: int, values: list[int], *, takes_time: bool = True) -> Answer:
         """Registers written; in a write and read of one transaction the read alone takes time."""
         if takes_time:
             self.pass_time()
-        return self.firmware.registers.write(address, values)
+        return self.registers.write(address, values)
 
 
 def _exception(answer: Answer) -> ExcCodes | None:

@@ -6,7 +6,9 @@ import pathlib
 import subprocess
 import sys
 from collections import Counter
+from graphlib import CycleError, TopologicalSorter
 
+import grimp
 import pytest
 from importlinter.cli import lint_imports
 
@@ -18,6 +20,17 @@ PACKAGES = sorted(p.parent for top in ("commissioner", "sim") for p in (ROOT / t
 def test_import_contracts_are_kept(capsys):
     broken = lint_imports(config_filename=str(ROOT / "pyproject.toml"), cache_dir=None, no_cache=True)
     assert broken == 0, capsys.readouterr().out
+
+
+def test_no_module_is_imported_by_what_it_imports():
+    """Not for the sake of a type either: a circle is one room with two doors."""
+    graph = grimp.build_graph("commissioner", "sim", exclude_type_checking_imports=False, cache_dir=None)
+    packages = {m for m in graph.modules if graph.find_children(m)}
+    imports = {m: graph.find_modules_directly_imported_by(m) - packages for m in graph.modules - packages}
+    try:
+        TopologicalSorter(imports).prepare()
+    except CycleError as circle:
+        pytest.fail(" -> ".join(circle.args[1]))
 
 
 def test_no_folder_holds_more_files_than_one_can_look_over():

@@ -12,6 +12,7 @@ import pytest
 from sim.drive.drive_map import load_map
 from sim.drive.firmware import Firmware
 from sim.drive.memory import Memory
+from sim.drive.registers import Registers
 from sim.drive.states import Answer, Setup, State, Trip
 from sim.physics import layout as at
 from sim.physics.machine import Effect, Plant, PowerStage, Sensors
@@ -27,12 +28,12 @@ def drive(plant: Plant | None = None, setup: Setup | None = None, memory: Memory
 
 def put(firmware: Firmware, name: str, value: object) -> Answer:
     item = MAP.items[name]
-    return firmware.registers.write(item.address, item.encode(value))
+    return Registers(firmware).write(item.address, item.encode(value))
 
 
 def get(firmware: Firmware, name: str):
     item = MAP.items[name]
-    return item.decode(firmware.registers.read(item.address, item.words))
+    return item.decode(Registers(firmware).read(item.address, item.words))
 
 
 def ready(firmware: Firmware, **changes: object) -> Firmware:
@@ -229,7 +230,7 @@ def test_window_header_data_and_check_sum_are_as_published():
     firmware = switch_on(ready(drive()))
     firmware.advance(0.1)
     put(firmware, "window_index", 17)
-    words = firmware.registers.read(256, 125)
+    words = Registers(firmware).read(256, 125)
     assert words[:5] == [firmware.session, 0, 17, 29, 0b1111]
     assert words[5] == MAP.flags["running"]
     assert words[6] * 0.02 == pytest.approx(540.0, rel=0.02)
@@ -242,11 +243,11 @@ def test_asking_again_gives_the_same_words():
     firmware = switch_on(ready(drive()))
     firmware.advance(0.2)
     put(firmware, "window_index", 100)
-    once = firmware.registers.read(256, 125)
+    once = Registers(firmware).read(256, 125)
     put(firmware, "window_index", 200)
-    firmware.registers.read(256, 125)
+    Registers(firmware).read(256, 125)
     put(firmware, "window_index", 100)
-    again = firmware.registers.read(256, 125)
+    again = Registers(firmware).read(256, 125)
     assert once[8:] == again[8:]
     assert once[:6] == again[:6]
 
@@ -254,7 +255,7 @@ def test_asking_again_gives_the_same_words():
 def test_a_short_read_gets_a_window_that_fits_it():
     firmware = switch_on(ready(drive(), channel_mask=0b0110))
     firmware.advance(0.1)
-    words = firmware.registers.read(256, 8 + 10)
+    words = Registers(firmware).read(256, 8 + 10)
     assert (words[3], words[4], len(words)) == (5, 0b0110, 18)
     check_window(words)
 
@@ -262,7 +263,7 @@ def test_a_short_read_gets_a_window_that_fits_it():
 def test_overwritten_samples_are_flagged_and_counted():
     firmware = switch_on(ready(drive(setup=Setup(ring_capacity=1000)), duration_s=20.0, watchdog_ms=2000))
     firmware.advance(0.3)
-    words = firmware.registers.read(256, 125)
+    words = Registers(firmware).read(256, 125)
     assert words[1] << 16 | words[2] == 500
     assert words[5] & MAP.flags["overrun"]
     assert get(firmware, "overruns") == 500
@@ -272,7 +273,7 @@ def test_last_window_says_that_nothing_follows():
     firmware = switch_on(ready(drive(), duration_s=0.1, watchdog_ms=2000))
     firmware.advance(1.0)
     put(firmware, "window_index", firmware.produced - 3)
-    words = firmware.registers.read(256, 125)
+    words = Registers(firmware).read(256, 125)
     assert words[3] == 3
     assert words[5] & MAP.flags["ended"]
     assert not words[5] & MAP.flags["running"]
@@ -283,7 +284,7 @@ def test_clipped_sensor_is_flagged():
     firmware = switch_on(ready(drive(plant), dc_bias_v=15.0))
     firmware.advance(0.3)
     firmware.values["window_index"] = firmware.produced - 20
-    assert firmware.registers.read(256, 125)[5] & MAP.flags["clipped"]
+    assert Registers(firmware).read(256, 125)[5] & MAP.flags["clipped"]
 
 
 def test_decimated_samples_are_means_over_the_periods():
@@ -301,22 +302,22 @@ def test_what_needs_a_stop_is_refused_while_energised(name):
     firmware = switch_on(ready(drive()))
     item = MAP.items[name]
     before = firmware.values[name]
-    assert firmware.registers.write(item.address, item.encode(before)) is Answer.BUSY
+    assert Registers(firmware).write(item.address, item.encode(before)) is Answer.BUSY
     assert firmware.values[name] == before
 
 
 def test_read_only_unknown_and_half_written_items_are_refused():
     firmware = drive()
     assert put(firmware, "magic", 1) is Answer.NO_SUCH_ADDRESS
-    assert firmware.registers.write(96 - 1, [1]) is Answer.NO_SUCH_ADDRESS
-    assert firmware.registers.read(77, 2) is Answer.NO_SUCH_ADDRESS
-    assert firmware.registers.write(MAP.items["current_limit_a"].address, [1]) is Answer.NO_SUCH_ADDRESS
-    assert firmware.registers.write(MAP.items["axis_deg"].address, floats(math.nan)) is Answer.BAD_VALUE
+    assert Registers(firmware).write(96 - 1, [1]) is Answer.NO_SUCH_ADDRESS
+    assert Registers(firmware).read(77, 2) is Answer.NO_SUCH_ADDRESS
+    assert Registers(firmware).write(MAP.items["current_limit_a"].address, [1]) is Answer.NO_SUCH_ADDRESS
+    assert Registers(firmware).write(MAP.items["axis_deg"].address, floats(math.nan)) is Answer.BAD_VALUE
 
 
 def test_a_refused_request_changes_none_of_its_items():
     firmware = drive()
-    assert firmware.registers.write(96, [400, *floats(7.0), *floats(math.inf)]) is Answer.BAD_VALUE
+    assert Registers(firmware).write(96, [400, *floats(7.0), *floats(math.inf)]) is Answer.BAD_VALUE
     assert firmware.values["watchdog_ms"] == 0
     assert firmware.values["current_limit_a"] == 0
 
@@ -325,7 +326,7 @@ def stage(firmware: Firmware, values: list[float], crc: int | None = None) -> No
     words = floats(*values)
     raw = b"".join(w.to_bytes(2, "big") for w in words)
     right = int.from_bytes(crc_bytes(raw), "little")
-    assert firmware.registers.write(592, [*words, right if crc is None else crc]) is Answer.DONE
+    assert Registers(firmware).write(592, [*words, right if crc is None else crc]) is Answer.DONE
     put(firmware, "commit", 0xC0DE)
 
 
@@ -412,7 +413,7 @@ def test_no_links_word_wraps(nominal_v, step_v):
     power_stage = replace(Plant().power_stage, link_v=nominal_v)
     firmware = drive(Plant(power_stage=power_stage))
     firmware.x[at.X_LINK] = 1.1 * nominal_v
-    words = firmware.registers.read(MAP.window_address, MAP.window_header_words)
+    words = Registers(firmware).read(MAP.window_address, MAP.window_header_words)
     counts = int(np.array(words[-2], np.uint16).view(np.int16))
     assert get(firmware, "dc_link_scale_v") == pytest.approx(step_v)
     assert counts * step_v == pytest.approx(1.1 * nominal_v, abs=step_v)

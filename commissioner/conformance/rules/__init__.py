@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commissioner.conformance.records import Rule
+from commissioner.conformance.registry import Rule
 from commissioner.conformance.rules import (
     enabling,
     excitation,

@@ -15,8 +15,7 @@ import numpy as np
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.export.contract import DictionaryEntry, ModelDocument, Nominal, TermRow
 from commissioner.diagnose.export.scenario import scenario
-from commissioner.diagnose.kernels import kinds
-from commissioner.diagnose.plant.model import Layout, Model, Term
+from commissioner.diagnose.plant.model import KINDS, Layout, Model, Term
 from commissioner.encoding import JsonObject
 
 FORMAT = 5
@@ -24,7 +23,6 @@ FORMAT = 5
 
 4: heat leaks away with more time constants, and the channels behind it have moved. 5: numbers name the channel they multiply.
 """
-KINDS = frozenset(v for k, v in vars(kinds).items() if k.isupper() and isinstance(v, int))
 
 
 def model_document(found: Any, causes: Sequence[Any]) -> ModelDocument:

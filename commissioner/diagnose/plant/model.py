@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from commissioner.diagnose.kernels import kinds
 
 Array = NDArray[np.float64]
+KINDS = frozenset(v for k, v in vars(kinds).items() if k.isupper() and isinstance(v, int))
+"""Of numbers that a model may have."""
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from typing import Any, NamedTuple, TypeVar, get_args, get_type_hints
 
-from commissioner.diagnose.contract import SearchRecord
 from commissioner.diagnose.rules import RULES, Rules
 from commissioner.diagnose.search.acceptance import guards
-from commissioner.encoding import plain
+from commissioner.encoding import JsonObject, plain
 
 
 @dataclass(frozen=True)
@@ -199,7 +198,7 @@ def followed(search: Generator[Step, None, Result], observe: Callable[[Step], No
             return found
 
 
-def written(steps: Iterable[Step]) -> list[SearchRecord]:
+def written(steps: Iterable[Step]) -> list[JsonObject]:
     """The records as JSON types: `step` names the kind."""
     return [{"step": type(step).__name__.lower(), **plain(step)} for step in steps]
 

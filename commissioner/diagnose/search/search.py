@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from commissioner.diagnose.causes import CATALOGUE, MENDED, Setting
+from commissioner.diagnose.causes import CATALOGUE, LINEAR, MENDED, Setting
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.fit.lost_samples import Loss, mend
 from commissioner.diagnose.fit.normal_equations import NormalEquations
@@ -70,6 +70,14 @@ class Found:
 
 
 Search = Generator[Step, None, Found]
+
+
+def not_told_apart(lines: int) -> tuple[str, ...]:
+    """Two lines fit the four parameters exactly: what only shifts them, or jumps in delay, cannot be named then. (A sweep has none.)"""
+    if lines not in (1, 2):
+        return ()
+    late = [name for name, cause in CATALOGUE.items() if cause.moves_the_clock]
+    return LINEAR if lines == 2 else (*LINEAR, *late)
 
 
 def search(

@@ -26,6 +26,7 @@ from commissioner.link.files.schema import (
     WorkedTable,
     explained,
 )
+from commissioner.link.files.tune_table import check_tuning
 from commissioner.paths import no_such_name
 from commissioner.registers.contradictions import check_contradictions
 from commissioner.registers.convention import CONVENTIONS, QUANTITIES, UNITS, unit_of
@@ -48,7 +49,7 @@ from commissioner.registers.profile import (
     is_a_lead,
 )
 from commissioner.registers.status import STATUS_BITS
-from commissioner.registers.tuning import Fact, Limit, Step, Tuning, check_tuning
+from commissioner.registers.tuning import Fact, Limit, Step, Tuning
 from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
 from commissioner.text import did_you_mean

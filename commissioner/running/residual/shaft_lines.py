@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.estimation.fit import Machine, Problem, simulate
-from commissioner.estimation.record import Window
+from commissioner.estimation.window import Window
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]

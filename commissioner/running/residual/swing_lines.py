@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from commissioner.estimation.fit import CALM_S, Machine, Problem, residuals, simulate
-from commissioner.estimation.record import STATES, Window
+from commissioner.estimation.record import STATES
+from commissioner.estimation.window import Window
 from commissioner.running.residual.shaft_lines import frame_of_voltage
 
 Array = NDArray[np.float64]

@@ -2,44 +2,20 @@
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection, Request
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import SAFE
-from commissioner.service.access.sessions import Session
-from commissioner.service.problems import Refusal
-from commissioner.service.runs.control import Party
-
-if TYPE_CHECKING:
-    from commissioner.service.parts import Parts
+from commissioner.service.access.visitor import Visitor, check_role, check_token
+from commissioner.service.parts import Parts
 
 COOKIE = "commissioner_session"
 LOCAL = "operator"
 """Whoever sits at this computer, where there are no accounts."""
-
-
-@dataclass(frozen=True)
-class Visitor:
-    """`role` None: nobody knows who it is. `session` None: a script without a cookie."""
-
-    person: str
-    role: Role | None
-    address: str
-    session: Session | None
-
-    @property
-    def party(self) -> Party:
-        """As who can hold control of a drive."""
-        return Party(self.session.id if self.session else "", self.person)
-
-    def may(self, role: Role) -> bool:
-        return self.role is not None and self.role >= role
 
 
 def parts_of(connection: HTTPConnection) -> Parts:
@@ -82,28 +58,3 @@ Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Administrator = Annotated[Visitor, Depends(require(Role.ADMINISTRATOR))]
 """Who may call a route of the API."""
-
-
-def check_role(who: Visitor, role: Role) -> None:
-    """Refusal 401 where nobody is logged in, 403 where the role is not enough."""
-    facts: dict[str, Any] = {"step": "access", "limit": f"role {role.name.lower()}"}
-    if who.role is None:
-        raise Refusal(
-            401,
-            "nobody is logged in",
-            value="no session",
-            remedy="log in: POST /api/login, or the page /login",
-            **facts,
-        )
-    if not who.may(role):
-        remedy = "ask somebody whose account has the role"
-        raise Refusal(403, "this needs another role", value=f"role {who.role.name.lower()}", remedy=remedy, **facts)
-
-
-def check_token(who: Visitor, token: str) -> None:
-    """Refusal 403 where a request with a session comes without what only its own pages know."""
-    if who.session is not None and not secrets.compare_digest(token.encode(), who.session.csrf.encode()):
-        raise Refusal(
-            403, "the request does not carry the session's token", step="access", value="no or another token",
-            limit="X-CSRF-Token, or the form's field csrf", remedy="load the page again, then repeat",
-        )  # fmt: skip

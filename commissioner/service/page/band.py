@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from commissioner.records import drive_words
 from commissioner.report.run.standing import Standing
 from commissioner.report.sheet.words import NBSP
-from commissioner.service.access.visitors import Visitor
+from commissioner.service.access.visitor import Visitor
 from commissioner.service.library import Drive
 from commissioner.service.page.texts import Texts
 from commissioner.service.parts import Parts

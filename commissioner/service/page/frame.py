@@ -14,7 +14,8 @@ from jinja2 import ChainableUndefined, Environment, FileSystemLoader, select_aut
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.pages import local, seen_at
-from commissioner.service.access.visitors import LOCAL, Visitor, check_role, check_token, parts_of, visitor_of
+from commissioner.service.access.visitor import Visitor, check_role, check_token
+from commissioner.service.access.visitors import LOCAL, parts_of, visitor_of
 from commissioner.service.page.band import Place, band_of
 from commissioner.service.page.texts import LANGUAGES, Texts, texts_of
 from commissioner.service.page.words import SCRIPT_TEXTS, Words

@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from commissioner.report.run.standing import Standing
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.pages import local
-from commissioner.service.access.visitors import COOKIE, check_token, parts_of
+from commissioner.service.access.visitor import check_token
+from commissioner.service.access.visitors import COOKIE, parts_of
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, remember, render
 from commissioner.service.problems import Refusal

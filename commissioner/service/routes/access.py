@@ -10,15 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.sessions import Session
-from commissioner.service.access.visitors import (
-    COOKIE,
-    Administrator,
-    Operator,
-    Visitor,
-    check_token,
-    parts_of,
-    visitor_of,
-)
+from commissioner.service.access.visitor import Visitor, check_token
+from commissioner.service.access.visitors import COOKIE, Administrator, Operator, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.people import (
     AccountDocument,

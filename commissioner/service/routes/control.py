@@ -18,7 +18,8 @@ from starlette.requests import ClientDisconnect, HTTPConnection
 from commissioner.encoding import JsonObject, read_json
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.pages import came_from
-from commissioner.service.access.visitors import Operator, Visitor, parts_of, visitor_of
+from commissioner.service.access.visitor import Visitor
+from commissioner.service.access.visitors import Operator, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import ControlDocument
 from commissioner.service.contract.runs import Stopped, StopsDocument

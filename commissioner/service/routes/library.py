@@ -9,7 +9,8 @@ from fastapi import APIRouter, Body, Request
 from pydantic import BaseModel, ConfigDict
 
 from commissioner.encoding import JsonObject
-from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
+from commissioner.service.access.visitor import Visitor
+from commissioner.service.access.visitors import Operator, Viewer, parts_of
 from commissioner.service.configuration import DriveTable, Identifier
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import (

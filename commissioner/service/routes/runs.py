@@ -12,7 +12,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from commissioner.run.archive.verify import refuse_changed
 from commissioner.service.access.gate import REPORT_CSP
-from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
+from commissioner.service.access.visitor import Visitor
+from commissioner.service.access.visitors import Operator, Viewer, parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.runs import Begun, RunAnswer, RunRow, RunsDocument

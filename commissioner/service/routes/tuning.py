@@ -8,7 +8,8 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.registers.tuning import MOST_REPEATS, REPEATS
-from commissioner.service.access.visitors import Operator, Visitor, parts_of
+from commissioner.service.access.visitor import Visitor
+from commissioner.service.access.visitors import Operator, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.runs import Answered, Begun
 from commissioner.service.parts import Parts

@@ -17,7 +17,8 @@ from commissioner.report.run.contract import WritePlan
 from commissioner.run.archive.documents import origin_of
 from commissioner.run.archive.follow import JournalFollower
 from commissioner.run.ending import WRITING_BEGAN
-from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
+from commissioner.service.access.visitor import Visitor
+from commissioner.service.access.visitors import Operator, Viewer, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.writing import RestoredDocument, WritingDocument, WrittenDocument
 from commissioner.service.library import Drive

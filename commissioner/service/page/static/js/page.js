@@ -250,5 +250,3 @@ document.addEventListener("submit", (event) => {
     put("say", busy);
   }
 });
-if ($("#plate")) import("./plate.js");
-if ($("#drop")) import("./drop.js");
