@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby, pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -59,15 +61,26 @@ def highest_stator_flux_wb(blocks: Iterable[tuple[int, SampleBlock]], machine: I
     """
     from commissioner.identify.excite.current_flux import CurrentFlux  # scipy: not for who only lists an archive
 
-    highest, current, flux, offset_a = 0.0, None, None, 0.0
-    for segment, block in blocks:
-        if block.count == 0:
-            continue
-        seen = axis_current_a(block.current_u_a, block.current_v_a, block.current_w_a, block.axis_deg)
-        if flux is None or segment != current:
-            current, flux, offset_a = segment, CurrentFlux(machine, block.sample_period_s), float(np.mean(seen))
-        highest = max(highest, peak(flux.advance(seen - offset_a, block.lost_before)))
+    highest = 0.0
+    for _, of_segment in groupby(((s, b) for s, b in blocks if b.count), key=itemgetter(0)):
+        parts = [block for _, block in of_segment]
+        flux, offset_a = CurrentFlux(machine, parts[0].sample_period_s), float(np.mean(_along_axis(parts[:1])))
+        holes = [k for k, block in enumerate(parts) if block.lost_before and k]
+        for first, end in pairwise([0, *holes, len(parts)]):
+            seen_a = _along_axis(parts[first:end]) - offset_a
+            highest = max(highest, peak(flux.advance(seen_a, parts[first].lost_before)))
     return highest
+
+
+def _along_axis(blocks: Sequence[SampleBlock]) -> Signal:
+    """Of blocks along one axis, between which nothing is missing."""
+    third = [block.current_w_a for block in blocks if block.current_w_a is not None]
+    return axis_current_a(
+        np.concatenate([block.current_u_a for block in blocks]),
+        np.concatenate([block.current_v_a for block in blocks]),
+        np.concatenate(third) if len(third) == len(blocks) else None,
+        blocks[0].axis_deg,
+    )
 
 
 def columns(recording: StandstillRecording) -> dict[str, Signal]:

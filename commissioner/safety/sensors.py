@@ -9,6 +9,7 @@ current magnitude, sample for sample, where the drive offers one.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -67,7 +68,7 @@ class SensorWatch:
 
     current_limit_a: float
     _at_rest: list[Signal] = field(default_factory=list)
-    _window: list[tuple[Signal, Signal]] = field(default_factory=list)
+    _window: list[SampleBlock] = field(default_factory=list)
     _zero: _Zero | None = None
     _claimed: tuple[int, float] | None = None
     _step_a: float = 0.0
@@ -84,10 +85,9 @@ class SensorWatch:
 
     def judge(self, block: SampleBlock) -> StopReason | None:
         """The first reason to distrust a sensor that this block and those before it give."""
-        phases = _phases(block)
-        return self._against_the_drive(block, phases) or self._against_the_axis(block, phases)
+        return self._against_the_drive(block) or self._against_the_axis(block)
 
-    def _against_the_drive(self, block: SampleBlock, phases: Signal) -> StopReason | None:
+    def _against_the_drive(self, block: SampleBlock) -> StopReason | None:
         if self._claimed is None:
             return None
         place = self._claimed[0] - block.first_index
@@ -96,6 +96,7 @@ class SensorWatch:
         claimed, self._claimed = self._claimed[1], None
         if place < 0:
             return None
+        phases = _phases([block])
         shown = peak(_three(phases)[:, place])
         noise_a = NOISES * float(np.max(self._zero.noise_a)) if self._zero else 0.0
         floor_a = (SCALE_FLOOR * self.current_limit_a + noise_a) * (1 if len(phases) == 3 else UNSEEN)
@@ -105,15 +106,14 @@ class SensorWatch:
             "the current samples and the drive's own current magnitude differ", shown, f"{claimed:.4g} A"
         )
 
-    def _against_the_axis(self, block: SampleBlock, phases: Signal) -> StopReason | None:
+    def _against_the_axis(self, block: SampleBlock) -> StopReason | None:
         if self._zero is None:
-            self._learn(block, phases)
+            self._learn(block)
             return None
-        self._window.append((phases, block.voltage_axis_v))
-        if sum(volts.size for _, volts in self._window) * block.sample_period_s < WINDOW_S:
+        self._window.append(block)
+        if sum(part.count for part in self._window) * block.sample_period_s < WINDOW_S:
             return None
-        seen = np.concatenate([part for part, _ in self._window], axis=1)
-        volts = np.concatenate([part for _, part in self._window])
+        seen, volts = _phases(self._window), np.concatenate([part.voltage_axis_v for part in self._window])
         self._window.clear()
         self._step_a = _smallest_step(seen, self._step_a)
         stopped = self._stopped(seen, volts, self._zero, volts.size * block.sample_period_s)
@@ -138,8 +138,9 @@ class SensorWatch:
             CABLE, unit="A",
         )  # fmt: skip
 
-    def _learn(self, block: SampleBlock, phases: Signal) -> None:
+    def _learn(self, block: SampleBlock) -> None:
         """Offsets and noise, from the time before the first volt."""
+        phases = _phases([block])
         at_rest = phases[:, np.cumsum(np.abs(block.voltage_axis_v)) == 0.0]
         self._at_rest.append(at_rest)
         seen = np.concatenate(self._at_rest, axis=1)
@@ -241,10 +242,11 @@ def _distrusted(what: str, value: float, limit: str, remedy: str = CHECK) -> Sto
     return StopReason(what, value, limit, remedy, is_fault=True, unit="A")
 
 
-def _phases(block: SampleBlock) -> Signal:
-    """`(2 or 3, n)`: the sensors there are."""
-    seen = [block.current_u_a, block.current_v_a]
-    return np.stack(seen if block.current_w_a is None else [*seen, block.current_w_a])
+def _phases(blocks: Sequence[SampleBlock]) -> Signal:
+    """`(2 or 3, n)`: the sensors there are, of blocks one after the other."""
+    w = [block.current_w_a for block in blocks if block.current_w_a is not None]
+    phases = [[block.current_u_a for block in blocks], [block.current_v_a for block in blocks], *([w] if w else [])]
+    return np.stack([np.concatenate(parts) for parts in phases])
 
 
 def _three(phases: Signal) -> Signal:

@@ -34,7 +34,7 @@ SHARED = 6
 OWN = 3
 PARTS = 4
 """Steps of a period in which the current passes zero."""
-_SOLVED = 1e-12
+_SOLVED = 1e-9
 """Of the current's span: what the implicit step may miss its current by."""
 _MOST_STEPS = 40
 ROWS = 256
