@@ -17,13 +17,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hidden:
-    """`usual`: its size's standard deviation beforehand where a recording tells nothing, 0 of what is not in every motor; `of_law`: of what it
-    moved, by one standard deviation, for its law is not known."""
+    """`usual`: its size's standard deviation beforehand where a recording tells nothing, 0 of what is not in every motor, or draws nothing
+    aside unseen; `of_law`: of what it moved, by one standard deviation, for its law is not known. `powers`: further numbers of its law, which count
+    together with the size; `shapes`: others of it, free once it has a size. Causes of the same words are forms of one, and the one that fits best
+    is it."""
 
     words: str
     size: str
     usual: float = 0.0
     of_law: float = 0.0
+    powers: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()
     corner: str = ""
     corners: tuple[float, ...] = ()
     has_sign: bool = False
@@ -33,7 +37,7 @@ class Hidden:
     @property
     def names(self) -> tuple[str, ...]:
         """Of the numbers that are fitted for it."""
-        return (self.size, self.corner) if self.corner else (self.size,)
+        return (self.size, *self.powers, *self.shapes, *([self.corner] if self.corner else []))
 
 
 HIDDEN = (
@@ -44,6 +48,19 @@ HIDDEN = (
     ),
     Hidden("a time between currents and voltages", "delay", has_sign=True),
     Hidden("what the inverter's legs lose", "dead_voltage", corner="dead_knee", corners=(DEFAULTS["dead_knee"],), is_of_inverter=True),
+    *(
+        Hidden(
+            "saturation of the main flux", f"{side}_saturation_1", powers=(f"{side}_saturation_2", f"{side}_saturation_3"),
+            shapes=("leakage_split",) if side == "gap" else (),
+        )
+        for side in ("stator", "gap", "rotor")
+    ),
+    *(
+        Hidden("saturation of the leakage", size, shapes=("leakage_knee", "leakage_bend"))
+        for size in ("leakage_softness", "rotor_leakage_softness")
+    ),
+    Hidden("heating of the windings", "stator_heat", usual=0.01, powers=("rotor_heat",)),
+    Hidden("heating of the windings", "rotor_heat", usual=0.01, powers=("stator_heat",)),
     *(Hidden("unlike gains of the voltages", f"voltage_gain_{part}", usual=0.001, has_sign=True, is_sought=False) for part in ("re", "im")),
 )  # fmt: skip
 """Usual sizes: a loss of 2 % of rated apparent power, bars that double R_R at starting slip, gains of three voltages that make 0.1 % of unbalance. In one steady load nothing is left of either: with a second
@@ -82,11 +99,13 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
         least = min(LEAST_SHARE * (fit.chi2 - wide.chi2), MOST_OF_IT * _left(wide))
         if gains[best][0] < max(LEAST_GAIN, least):
             break
-        wide = _with(problem, wide, gains[best][1], open_.pop(best))
+        forms = [k for k, hidden in enumerate(open_) if hidden.words == open_[best].words]
+        wide = min((_with(problem, wide, gains[k][1], open_[k]) for k in forms), key=lambda form: form.chi2)
+        open_ = [hidden for k, hidden in enumerate(open_) if k not in forms]
     unsure = {AT[n] for h in told_in(wide) if not _is_sure(problem, wide, h) for n in h.names}
     if unsure:
         kept = [c for c in wide.columns if c.kind != "p" or c.index not in unsure]
-        none = {h.size: 0.0 for h in HIDDEN if AT[h.size] in unsure}
+        none = {n: 0.0 for h in HIDDEN if AT[h.size] in unsure for n in (h.size, *h.powers)}
         wide = refine(problem, wide.machine.with_values(none), kept)
     gain, more = fit.chi2 - wide.chi2, len(wide.columns) - len(fit.columns)
     is_all = _left(wide) < max(ALL_OF_IT * gain, _by_chance(wide))
@@ -108,17 +127,29 @@ def _by_chance(fit: Fit) -> float:
 
 
 def _is_sure(problem: Problem, fit: Fit, hidden: Hidden) -> bool:
-    size = fit.machine.value(hidden.size)
+    size, std = _size_of(fit, hidden)
     if hidden.has_sign:
         size = abs(size) if abs(size) < MOST_DELAY * problem.period else 0.0
-    return size * SURE > fit.std(hidden.size)
+    return size * SURE > std
+
+
+def _size_of(fit: Fit, hidden: Hidden) -> tuple[float, float]:
+    """What its law adds in all, and the standard deviation of that with the law's shapes as they are: along these it is not told."""
+    names = (hidden.size, *hidden.powers)
+    own, shapes = ([fit.place(name) for name in group] for group in (names, hidden.shapes))
+    covariance = fit.covariance()
+    beside = covariance[np.ix_(own, shapes)]
+    variance = np.sum(covariance[np.ix_(own, own)]) - np.sum(
+        beside @ np.linalg.pinv(covariance[np.ix_(shapes, shapes)]) @ beside.T
+    )
+    return sum(fit.machine.value(name) for name in names), float(np.sqrt(max(variance, 0.0)))
 
 
 def _with(problem: Problem, fit: Fit, machine: Machine, hidden: Hidden) -> Fit:
-    """Refitted with the cause, its corner free once it has a size: without one it says nothing."""
-    size, *corner = (Column("p", AT[name]) for name in hidden.names)
-    fit = refine(problem, machine, (*fit.columns, size), is_final=not corner)
-    return refine(problem, fit.machine, (*fit.columns, *corner)) if corner else fit
+    """Refitted with the cause, its powers and shapes free once it has a size: without one it says nothing."""
+    size, *more = (Column("p", AT[name]) for name in hidden.names)
+    fit = refine(problem, machine, (*fit.columns, size), is_final=not more)
+    return refine(problem, fit.machine, (*fit.columns, *more)) if more else fit
 
 
 def _best(problem: Problem, fit: Fit, hidden: Hidden) -> tuple[float, Machine]:

@@ -35,12 +35,11 @@ from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import STATES, Record, prepare, scales_of
 from commissioner.estimation.window import first_part
 from commissioner.identify.contract import Measured, RunningDocument
-from commissioner.motor.channels.clock import turn_a_row
 from commissioner.motor.channels.faults import currents_on_time
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
-from commissioner.running.at_flux import OF_IRON
+from commissioner.running.at_flux import OF_IRON, at_flux, is_saturated, stator_flux_wb
 from commissioner.running.nominal import OPEN_INERTIA, require_a_motor, with_shaft, with_speed
 from commissioner.running.residual.lack import Lack, lack_of_fit, not_told
 
@@ -103,7 +102,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     fit = with_told(problem, fit)
     fit = unbiased(problem, fit)
     late = Quantity(shift + fit.machine.value("speed_lag"), fit.std("speed_lag"))
-    moves = _moves(fit)
+    moves = _moves(record, fit)
     noise_only = moves @ fit.covariance() @ moves.T
     whole = _covariance(problem, fit)
     beside = np.vstack([by_lag, by_laws(fit, moves)])  # a filter or a counter, where iron acts: not known
@@ -118,12 +117,12 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     whole, covariance = whole + aside.T @ aside, covariance + moves @ aside.T @ aside @ moves.T
     left = lack_of_fit(problem, fit.machine)
     inertia, load = _shaft(problem, fit, covariance, _inertia_of(fit, whole))
-    four = at_small_slip(fit.machine.values())
+    four = _four_at_flux(record, fit.machine.values())
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
     bound = {name: quantity.std for name, quantity in _parameters(four, noise_only / fit.scale).items()}
     return Identified(
         _parameters(four, covariance), bound, covariance, inertia, load, to_t_model(four, absolute), left,
-        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, late, inertia, fit),
+        fit.chi2 / fit.count, abs(stator_flux_wb(record, fit.machine.values())), record, fit, _remarks(record, left, late, inertia, fit),
     )  # fmt: skip
 
 
@@ -183,10 +182,23 @@ def _by_inertia(problem: Problem, fit: Fit) -> Array:
     return np.asarray(OF_ASSUMED_INERTIA * fit.influence() @ (fit.jacobian @ along))
 
 
-def _moves(fit: Fit) -> Array:
-    """(four, columns): by how much each column moves the logarithms of R_s, R_R, L_sigma, L_M at small slip."""
-    told = made_of(fit, lambda values: dict(zip(FOUR, np.log(at_small_slip(values).as_tuple()).tolist(), strict=True)))
+def _moves(record: Record, fit: Fit) -> Array:
+    """(four, columns): by how much each column moves the logarithms of R_s, R_R, L_sigma, L_M at small slip and at the recording's flux."""
+
+    def logarithms(values: Mapping[str, float]) -> dict[str, float]:
+        return dict(zip(FOUR, np.log(_four_at_flux(record, values).as_tuple()).tolist(), strict=True))
+
+    told = made_of(fit, logarithms)
     return np.array([told[name][1] for name in FOUR])
+
+
+def _four_at_flux(record: Record, values: Mapping[str, float]) -> InverseGamma:
+    """Of iron that saturates those that hold at the recording's flux; else at every."""
+    small = at_small_slip(values)
+    if not is_saturated(values):
+        return small
+    held = at_flux(record, values)
+    return InverseGamma(small.stator_resistance_ohm, *(held[name] for name in PARAMETERS[1:]))
 
 
 def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
@@ -288,14 +300,6 @@ def _solved(design: Array, target: Array) -> Array:
     return np.asarray(lsq_linear(design, target, (lower, np.inf), method="bvls").x)
 
 
-def _flux(record: Record) -> float:
-    """Peak stator flux at which the magnetizing inductance holds: voltage over frequency of the last steady stretch."""
-    w = record.windows[-1]
-    u = w.voltage[::2, 0] + 1j * w.voltage[::2, 1]
-    tail = u[-max(round(0.1 / record.period_s), 10) :]
-    return float(np.median(np.abs(tail)) / max(abs(turn_a_row(tail)) / record.period_s, 1e-9))
-
-
 def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | None, fit: Fit) -> tuple[str, ...]:
     out = [*record.remarks, *not_told(fit)]
     worst = max(left.sigma, left.burst_sigma)
@@ -303,7 +307,7 @@ def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | Non
         out.append(
             f"The four numbers leave {worst:.2g} times the noise: something is missing (saturation, deep bars, sensors) that may have drawn them aside by more than their intervals, widened as these are; `commissioner diagnose` names it."
         )
-    if told := [hidden.words for hidden in told_in(fit)]:
+    if told := dict.fromkeys(hidden.words for hidden in told_in(fit)):
         out.append(f"In the fit besides: {' and '.join(told)}, which explain what the four numbers left.")
     if not record.has_speed and record.has_start:
         out.append(
