@@ -103,8 +103,8 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
         if gains[best][0] < max(LEAST_GAIN, least):
             break
         left = _left(wide)
-        forms = [k for k, hidden in enumerate(open_) if hidden.words == open_[best].words]
-        wide = min((_with(problem, wide, gains[k][1], open_[k]) for k in forms), key=lambda form: form.chi2)
+        forms = sorted((k for k, h in enumerate(open_) if h.words == open_[best].words), key=lambda k: -gains[k][0])
+        wide = _best_form(problem, wide, [(gains[k][1], open_[k]) for k in forms])
         open_ = [hidden for k, hidden in enumerate(open_) if k not in forms]
         if left - _left(wide) < LEAST_OF_REST * left:
             return fit
@@ -156,6 +156,16 @@ def _with(problem: Problem, fit: Fit, machine: Machine, hidden: Hidden) -> Fit:
     size, *more = (Column("p", AT[name]) for name in hidden.names)
     fit = refine(problem, machine, (*fit.columns, size), is_final=not more)
     return refine(problem, fit.machine, (*fit.columns, *more)) if more else fit
+
+
+def _best_form(problem: Problem, fit: Fit, forms: Sequence[tuple[Machine, Hidden]]) -> Fit:
+    """Refitted with the form that fits best; the first that leaves nothing is as good as any."""
+    tried = []
+    for machine, hidden in forms:
+        tried.append(_with(problem, fit, machine, hidden))
+        if _left(tried[-1]) < _by_chance(tried[-1]):
+            break
+    return min(tried, key=lambda form: form.chi2)
 
 
 def _best(problem: Problem, fit: Fit, hidden: Hidden) -> tuple[float, Machine]:
