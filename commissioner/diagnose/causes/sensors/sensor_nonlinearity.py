@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Sequence
+
 import numpy as np
 
-from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Words
+from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Proposal, Standing, Words
+from commissioner.diagnose.causes.sensors.sensor_gain_mismatch import CAUSE as GAINS
 from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import EVEN, ODD
 from commissioner.diagnose.plant import sensor_curve
@@ -27,7 +30,7 @@ class SensorNonlinearity(Cause):
     signature = "even or odd lines that no impedance has filtered, in each sensor by its own current"
     source = "reported = i (1 + n2 i/I_fs + n3 (i/I_fs)^2 + ...), I_fs twice the rated peak; linearity figures of data sheets"
     confounders = (Confounder("dead_time"), Confounder("dc_link_sag"), Confounder("leakage_saturation"))
-    imitates = ("sensor_gain_mismatch",)
+    imitates = (GAINS.name,)
     split_by = "DC staircase"
     decides = "Compare the sensors with a good meter at five DC currents of both signs."
     either = tuple(
@@ -46,6 +49,18 @@ class SensorNonlinearity(Cause):
             for part, kind in (("even", EVEN), ("odd", ODD))
             for m, bend in enumerate(BENDS)
             for k in range(setting.facts.phases)
+        )
+
+    def occasion(self, accepted: Sequence[Cause], names: Collection[str]) -> frozenset[str] | None:
+        return frozenset({self.name}) if self in accepted and GAINS not in accepted and GAINS.name in names else None
+
+    def proposals(self, here: Standing) -> Iterable[tuple[Proposal, ...]]:
+        """Unlike gains, straight, where the numbers of a bend are not worth what they gain beside them: all sensors' together bend as gains differ."""
+        model = here.model.without(self.name).with_terms(GAINS.terms(here.setting))
+        yield (
+            Proposal(
+                model, (self.name,), (GAINS.name,), here.saved_chi2(model), f"{GAINS.name} in place of {self.name}"
+            ),
         )
 
     def sizes(self, setting: Setting, values: Numbers) -> Sizes:
