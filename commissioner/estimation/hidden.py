@@ -96,7 +96,7 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
     if fit.chi2 < fit.count + LEAST_GAIN or problem.record.has_one_load:
         return fit
     wide, open_ = fit, [h for h in HIDDEN if h.is_sought and (not h.is_of_inverter or problem.record.is_commanded)]
-    while open_ and _left(wide) > _by_chance(wide):
+    while open_:
         gains = [_best(problem, wide, hidden) for hidden in open_]
         best = int(np.argmax([gain for gain, _ in gains]))
         least = min(LEAST_SHARE * (fit.chi2 - wide.chi2), MOST_OF_IT * _left(wide))
@@ -106,7 +106,7 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
         forms = sorted((k for k, h in enumerate(open_) if h.words == open_[best].words), key=lambda k: -gains[k][0])
         wide = _best_form(problem, wide, [(gains[k][1], open_[k]) for k in forms])
         open_ = [hidden for k, hidden in enumerate(open_) if k not in forms]
-        if left - _left(wide) < LEAST_OF_REST * left:
+        if _left(wide) > max(_by_chance(wide), (1.0 - LEAST_OF_REST) * left):
             return fit
     unsure = {AT[n] for h in told_in(wide) if not _is_sure(problem, wide, h) for n in h.names}
     if unsure:
