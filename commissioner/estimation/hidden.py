@@ -78,6 +78,8 @@ MOST_DELAY = 1.5
 """Sample periods: what a cubic through four samples can be moved by."""
 ALL_OF_IT, BY_CHANCE = 0.02, 5.0
 """What may be left: a share of what was gained, and standard deviations of the noise's own chi-square."""
+AS_NOISE = 0.05
+"""Of the noise's power, which is known to some per cent itself, as much may be left as well: a quarter of the noise, of which nothing is said."""
 LEAST_SHARE, MOST_OF_IT = 0.01, 0.5
 """Of what the first ones gained: less is what their laws leave, simpler than nature's, unless it is this share of all that is left (of an iron loss beside
 bars)."""
@@ -93,7 +95,7 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
     to 2.2 % off so, 0.07 to 0.15 % in the fit). Where more is left another cause may lend them its own size. The one that gains most is
     taken first: a loss that is not there, asked for beside bars, kept these out.
     """
-    if fit.chi2 < fit.count + LEAST_GAIN or problem.record.has_one_load:
+    if problem.record.has_one_load:
         return fit
     wide, open_ = fit, [h for h in HIDDEN if h.is_sought and (not h.is_of_inverter or problem.record.is_commanded)]
     while open_:
@@ -106,7 +108,7 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
         forms = sorted((k for k, h in enumerate(open_) if h.words == open_[best].words), key=lambda k: -gains[k][0])
         wide = _best_form(problem, wide, [(gains[k][1], open_[k]) for k in forms])
         open_ = [hidden for k, hidden in enumerate(open_) if k not in forms]
-        if _left(wide) > max(_by_chance(wide), (1.0 - LEAST_OF_REST) * left):
+        if _left(wide) > max(_by_chance(wide), AS_NOISE * fit.count, (1.0 - LEAST_OF_REST) * left):
             return fit
     unsure = {AT[n] for h in told_in(wide) if not _is_sure(problem, wide, h) for n in h.names}
     if unsure:
@@ -114,7 +116,7 @@ def with_told(problem: Problem, fit: Fit) -> Fit:
         none = {n: 0.0 for h in HIDDEN if AT[h.size] in unsure for n in (h.size, *h.powers)}
         wide = refine(problem, wide.machine.with_values(none), kept)
     gain, more = fit.chi2 - wide.chi2, len(wide.columns) - len(fit.columns)
-    is_all = _left(wide) < max(ALL_OF_IT * gain, _by_chance(wide))
+    is_all = _left(wide) < max(ALL_OF_IT * gain, _by_chance(wide), AS_NOISE * fit.count)
     is_sure = all(_is_sure(problem, wide, h) for h in told_in(wide))
     return wide if is_all and is_sure and gain > LEAST_GAIN * max(more, 1) else fit
 
