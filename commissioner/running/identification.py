@@ -305,7 +305,7 @@ def _remarks(record: Record, left: Lack, late: Quantity, inertia: Quantity | Non
     worst = max(left.sigma, left.burst_sigma)
     if worst > LEAST_OVER_NOISE:
         out.append(
-            f"The four numbers leave {worst:.2g} times the noise: something is missing (saturation, deep bars, sensors) that may have drawn them aside by more than their intervals, widened as these are; `commissioner diagnose` names it."
+            f"The four numbers leave {worst:.2g} times the noise: something is missing (a fault, a sensor, iron or bars of another form) that may have drawn them aside by more than their intervals, widened as these are; `commissioner diagnose` names it."
         )
     if told := dict.fromkeys(hidden.words for hidden in told_in(fit)):
         out.append(f"In the fit besides: {' and '.join(told)}, which explain what the four numbers left.")
