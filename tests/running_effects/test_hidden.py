@@ -164,12 +164,9 @@ def _with_effects(seed: int, *names: str) -> Scenario:
 def _at_flux(scenario: Scenario, flux_wb: float) -> tuple[float, ...]:
     """The four at this stator flux and currents of a small slip, by the simulator's law (sinh) of its iron and what leaks in its bars."""
     machine, m = scenario.machine, machine_array(scenario)
-    x = m[at.SATURATION_STEEPNESS] * flux_wb / m[at.FLUX]
-    added = (
-        m[at.SATURATION]
-        * (np.sinh(x) / x - 1.0)
-        / (np.sinh(x * m[at.FLUX] / flux_wb) / (x * m[at.FLUX] / flux_wb) - 1.0)
-    )
+    k = m[at.SATURATION_STEEPNESS]
+    x = k * flux_wb / m[at.FLUX]
+    added = m[at.SATURATION] * (np.sinh(x) / x - 1.0) / (np.sinh(k) / k - 1.0)
     leaks = (
         machine.rotor_resistance_ohm * (m[at.BAR_1] / m[at.CORNER_1] + m[at.BAR_2] / m[at.CORNER_2])
         if m[at.BAR_1]

@@ -61,7 +61,7 @@ def test_stop_ends_the_voltage_in_each_of_its_ways(service, browser, way):
 
 
 def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(browser, tmp_path):
-    """A run of six tests: it must still be energised when the second page has been lost."""
+    """A run of twelve tests: it must still be energised when the second page has been lost."""
     settings = f"page_lost_s = {PAGE_LOST_S}\nhand_over_s = 60.0\naxes_deg = {list(range(0, 360, 30))}"
     with (
         ServiceProcess(tmp_path, settings=settings) as service,
