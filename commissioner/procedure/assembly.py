@@ -20,26 +20,29 @@ def assemble(
 
     Segments follow each other on the time axis; lost samples are missing rows, as the contract says.
     """
-    times: list[Signal] = []
     rows: list[tuple[int, SampleBlock]] = []
-    offset, end, current = 0.0, 0.0, None
+    begun_s: list[float] = []
+    offset_s, end_s, current = 0.0, 0.0, None
     for segment, block in blocks:
         if block.count == 0:
             continue
         if segment != current:
-            offset, current = end, segment
-        index = np.arange(block.first_index, block.first_index + block.count, dtype=np.float64)
-        times.append(offset + index * block.sample_period_s)
-        end = float(times[-1][-1]) + block.sample_period_s
+            offset_s, current = end_s, segment
+        begun_s.append(offset_s)
+        last_s = offset_s + float(block.first_index + block.count - 1) * block.sample_period_s
+        end_s = last_s + block.sample_period_s
         rows.append((segment, block))
     if not rows:
         return None
-    counts = [block.count for _, block in rows]
+    counts = np.array([block.count for _, block in rows])
+    before = np.array([block.first_index for _, block in rows]) - (np.cumsum(counts) - counts)
+    index = np.arange(counts.sum()) + np.repeat(before, counts)
+    periods_s = np.repeat([block.sample_period_s for _, block in rows], counts)
     averaged = np.repeat(np.array([block.averaged for _, block in rows], dtype=np.int64), counts)
     has_means, period_s = bool(np.any(averaged > 1)), rows[0][1].sample_period_s / rows[0][1].averaged
     third = [block.current_w_a for _, block in rows if block.current_w_a is not None]
     return StandstillRecording(
-        time_s=np.concatenate(times),
+        time_s=np.repeat(begun_s, counts) + index * periods_s,
         segment=np.repeat(np.array([segment for segment, _ in rows], dtype=np.int64), counts),
         axis_deg=np.repeat([float(block.axis_deg) for _, block in rows], counts),
         voltage_axis_v=np.concatenate([block.voltage_axis_v for _, block in rows]),

@@ -11,7 +11,7 @@ from pathlib import Path
 from commissioner.encoding import HIDDEN
 from commissioner.recordings.whole import folder_to_write, write_text
 from commissioner.settings import load
-from commissioner.study.commissioning import require_drawable
+from commissioner.study.drawing import require_drawable
 from commissioner.study.rows import Rows
 from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from commissioner.diagnose.export.scenario import typical_motor
-from commissioner.errors import CommissionerError, ConfigurationError
+from commissioner.errors import CommissionerError
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.in_process import InProcessPort
@@ -25,9 +24,10 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.job import bounds, make_job, open_drive, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.settings import load_procedure
+from commissioner.study.drawing import draw
 from commissioner.study.own_process import simulated_inverter
 from commissioner.study.rows import Row
-from commissioner.study.simulators import Drawn, simulator
+from commissioner.study.simulators import Drawn
 from commissioner.study.specification import Case
 
 PROFILE = "simulated"
@@ -45,35 +45,6 @@ class NoArchive:
     def save(self, name: str, document: object) -> None: ...
 
 
-def require_drawable(cases: Sequence[Case], file: Path) -> None:
-    """ConfigurationError: what the study asks for can be drawn for none of its motors, as where an effect is misspelt."""
-    said, asked = "", ""
-    for case in {one.motor: one for one in reversed(cases) if one.kind == "commission"}.values():
-        try:
-            _drawn(case)
-            return
-        except ValueError as error:
-            said, asked = str(error), ", ".join(sorted({*case.effects, *case.faults} - {"none"})) or case.motor
-    if said:
-        raise ConfigurationError(
-            file=str(file), key="motors, effects or faults", value=asked, expected=f"what the simulator knows; {said}"
-        )
-
-
-def _drawn(case: Case) -> Drawn:
-    """ValueError: it cannot be, as a fault that only a line can have where there is none."""
-    drawn = simulator().draw(
-        typical_motor(case.motor, case.plate) if case.plate else case.motor,
-        case.seed,
-        spread=case.spread,
-        effects=case.effects,
-        noise_a=case.noise_a,
-        faults=case.faults,
-    )
-    _ = drawn.station if case.links == "memory" else None  # made here, where its ValueError is caught
-    return drawn
-
-
 def commissioned(case: Case) -> Row:
     """The row of one case. A case that cannot be drawn or carried out is a row that says so."""
     began = time.process_time()
@@ -83,7 +54,7 @@ def commissioned(case: Case) -> Row:
     }  # fmt: skip
     row |= {f"{name}_{what}": None for name in PARAMETERS for what in ("true", "value", "std")}
     try:
-        drawn = _drawn(case)
+        drawn = draw(case)
     except ValueError as error:
         return cast("Row", row | {"reason": str(error), "cpu_s": time.process_time() - began})
     row |= {

@@ -187,7 +187,7 @@ class Firmware:
 
     @property
     def winding_degc(self) -> float:
-        hottest = float(np.max(self.x[at.X_HEAT_A : at.X_HEAT_C + 1]))
+        hottest = max(self.x[at.X_HEAT_A : at.X_HEAT_C + 1].tolist())
         return self.setup.winding_degc + hottest / COPPER_PER_K
 
     @property

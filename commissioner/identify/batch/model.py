@@ -115,6 +115,8 @@ def stator_flux(theta: Matrix, model: ModelChoice, iron_wb: float) -> float:
 def stator_flux_of_current(theta: Matrix, model: ModelChoice, iron_wb: Signal, current_a: Signal) -> Signal:
     """What the leakage between stator and iron adds to the iron's flux at these currents."""
     split, l_l, l_0 = float(theta[SPLIT]), float(theta[2]), float(theta[3])
+    if split == 0.0:
+        return iron_wb
     straight_a = current_a - (1.0 - split) * extra_current(theta, model, iron_wb)
     return np.asarray((iron_wb + split * l_l * straight_a) / (1.0 + split * l_l / l_0))
 

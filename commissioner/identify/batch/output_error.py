@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.compiled import njit
+from commissioner.compiled import BORROWED, njit
 
 Array = NDArray[np.float64]
 Exponents = NDArray[np.int64]
@@ -32,8 +32,6 @@ DELAY = 4
 SPLIT = 5
 SHARED = 6
 OWN = 3
-PARTS = 4
-"""Steps of a period in which the current passes zero."""
 _SOLVED = 1e-9
 """Of the current's span: what the implicit step may miss its current by."""
 _MOST_STEPS = 40
@@ -46,7 +44,7 @@ _S1, _S2, _SI, _DG, _DG_LAST, _PUSHED, _PUSHED_R, _TO_S1, _TO_S2, _TO_I, _TO_G, 
 
 class Measured(NamedTuple):
     """One segment (n,): voltage as commanded, V, and before its first sample; current, A; weight, 0 for samples that were lost; the
-    periods that are done in parts, for the current passes zero in them."""
+    periods that are done in `Held.parts` steps, for the current passes zero in them."""
 
     u: Array
     u_before: float
@@ -56,9 +54,10 @@ class Measured(NamedTuple):
 
 
 class Held(NamedTuple):
-    """Of the linear circuit over a period and over a part of one, first axis: held-input response `ad` (2, 2, 2), `b1` (2, 2), ramp response
+    """Of the linear circuit over a period and over one of its `parts`, first axis: held-input response `ad` (2, 2, 2), `b1` (2, 2), ramp response
     `b2` (2, 2), response `b_r` (2, 2) to a voltage held on the rotor; their derivatives (2, 4, 2, 2) and (2, 4, 2) by the circuit's four."""
 
+    parts: int
     ad: Array
     b1: Array
     b2: Array
@@ -97,7 +96,8 @@ class Shapes(NamedTuple):
 class Asked(NamedTuple):
     """What is asked for, and where it goes: `wanted` (p,) is 1 where a sensitivity is to be carried; J^T W J and J^T W e are added to
     `information` (p, p) and `score` (p,), the latter also by stretches of `block` samples to `block_scores`; `residual`, `flux` of the iron (n,); `rows`
-    for the weighted sensitivities: those of every sample where it has (n, p), else of a stretch."""
+    for the weighted sensitivities: of a stretch; or of every sample where it has (n, p), and nothing is added: `add_scores` does for any
+    residuals, and numpy makes half the product."""
 
     wanted: Array
     information: Array
@@ -109,7 +109,18 @@ class Asked(NamedTuple):
     rows: Array
 
 
-@njit()
+class Room(NamedTuple):
+    """To work in, zeros: F and its integral as in `Loss` (rows,), what is carried on (12 WIDTH,), powers of the iron's flux (m + 1,), residuals of a
+    stretch (ROWS,)."""
+
+    table: Array
+    integral: Array
+    carried: Array
+    power: Array
+    missed: Array
+
+
+@njit(**BORROWED)
 def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     """(cell, fraction inside it, rows beyond the table) of the size of a current."""
     at = abs(i) * per_a
@@ -154,7 +165,7 @@ def _mean_loss(
     return mean, (mean - sign0 * f0) / apart, (sign1 * f1 - mean) / apart
 
 
-@njit()
+@njit(**BORROWED)
 def _extra(machine: Machine, flux: float, power: Array) -> tuple[float, float]:
     """(g, g') at the iron's flux; the odd powers of the relative flux into `power`."""
     theta, exponents, flux_scale = machine.theta, machine.exponents, machine.flux_scale
@@ -262,12 +273,14 @@ def _push_of_loss(
 
 
 @njit(inline="always")
-def _add_rows(rows: Array, missed: Array, information: Array, score: Array, block_score: Array) -> None:
-    """Weighted sensitivities (rows, p) and residuals (rows,) into the normal equations."""
-    information += np.dot(rows.T, rows)
-    added = np.dot(missed, rows)
-    score += added
-    block_score += added
+def _add_rows(rows: Array, missed: Array, count: int, information: Array, score: Array, block_score: Array) -> None:
+    """Of the first `count` weighted sensitivities (rows, p) and residuals (rows,) what they add to the normal equations."""
+    for r in range(count):
+        for i in range(score.size):
+            score[i] += missed[r] * rows[r, i]
+            block_score[i] += missed[r] * rows[r, i]
+            for j in range(score.size):
+                information[i, j] += rows[r, i] * rows[r, j]
 
 
 @njit(inline="always")
@@ -321,8 +334,8 @@ def _add_directly(
         to_g[SHARED + m], to_i[SHARED + m] = power[m], on_stator * power[m]
 
 
-@njit(fastmath={"contract", "reassoc", "nsz", "arcp"})
-def simulate(
+@njit(fastmath={"contract", "reassoc", "nsz", "arcp"}, **BORROWED)
+def _simulated(
     measured: Measured,
     held_input: Held,
     machine: Machine,
@@ -331,10 +344,8 @@ def simulate(
     delay: float,
     asked: Asked,
     is_linearised: bool,
+    room: Room,
 ) -> float:
-    """Residuals y - i and the iron's flux; where `is_linearised`, normal equations and weighted sensitivities too, by the shared parameters
-    and the segment's `own` three. `delay` in periods. Returns sum W e^2, infinite where the model runs away.
-    """
     theta = machine.theta
     u, y, weight, passes_zero = measured.u, measured.y, measured.weight, measured.passes_zero
     ad, b1, b2, b_r = held_input.ad, held_input.b1, held_input.b2, held_input.b_r
@@ -351,18 +362,21 @@ def simulate(
     on_stator, on_rotor = 1.0 - theta[SPLIT], theta[SPLIT]
     is_split = extra_powers > 0 and (on_rotor != 0.0 or wanted[SPLIT] > 0.0)
     h_s, h_r = 1.0 / l_0 + 1.0 / l_l, -1.0 / l_l
-    table, integral = np.zeros(basis.shape[0]), np.zeros(basis.shape[0])
-    for c in range(k_f):
-        table += theta[first_f + c] * basis[:, c]
-        integral += theta[first_f + c] * basis_integral[:, c]
-    furthest, loss = np.max(np.abs(table)), Loss(table, integral, per_a)
+    loss, furthest = Loss(room.table, room.integral, per_a), 0.0
+    for row in range(basis.shape[0]):
+        for c in range(k_f):
+            loss.table[row] += theta[first_f + c] * basis[row, c]
+            loss.integral[row] += theta[first_f + c] * basis_integral[row, c]
+        furthest = max(furthest, abs(loss.table[row]))
 
     x1, x2 = own[1], own[2]
-    m, width = np.zeros(12 * WIDTH), (p + 3) // 4 * 4  # d(psi_s, psi_R, i), and what they are carried on with
-    m[_S1 + first_own + 1], m[_S2 + first_own + 2], m[_WANTED : _WANTED + p] = 1.0, 1.0, wanted
+    m, width = room.carried, (p + 3) // 4 * 4  # d(psi_s, psi_R, i), and what they are carried on with
+    m[_S1 + first_own + 1], m[_S2 + first_own + 2] = 1.0, 1.0
+    for j in range(p):
+        m[_WANTED + j] = wanted[j]
     s1, s2, si, dg, pushed = m[_S1:_S2], m[_S2:_SI], m[_SI:_DG], m[_DG:_DG_LAST], m[_PUSHED:_PUSHED_R]
     to_s1, to_s2, to_i, to_g = m[_TO_S1:_TO_S2], m[_TO_S2:_TO_I], m[_TO_I:_TO_G], m[_TO_G:_WANTED]
-    power = np.zeros(extra_powers + 1)
+    power = room.power
     x_iron = on_stator * x1 + on_rotor * x2
     g, slope_g = _extra(machine, x_iron, power)
     g_last = g
@@ -371,8 +385,8 @@ def simulate(
     for j in range(p):
         dg[j] = slope_g * (on_stator * s1[j] + on_rotor * s2[j]) + to_g[j]
         si[j] = h_s * s1[j] + h_r * s2[j] + on_stator * (dg[j] - to_g[j]) + to_i[j]
-    m[_DG_LAST:_PUSHED] = dg
-    missed, begun, keeps = np.zeros(ROWS), 0, rows.shape[0] == u.size
+        m[_DG_LAST + j] = dg[j]
+    missed, begun, keeps = room.missed, 0, rows.shape[0] == u.size
     total, v_last, last_parts = 0.0, measured.u_before, 1
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
@@ -381,20 +395,20 @@ def simulate(
         w = weight[k]
         total += w * e * e if w > 0.0 else 0.0
         if is_linearised:
-            root, at, gathered = np.sqrt(w), (k if keeps else k - begun), k + 1 - begun
+            root, at = np.sqrt(w), (k if keeps else k - begun)
             for j in range(p):
                 rows[at, j] = root * si[j]
             rows[at, first_own] = root * wanted[first_own]
-            missed[gathered - 1] = root * e if w > 0.0 else 0.0
-            if gathered == ROWS or (k + 1) % block == 0 or k == u.size - 1:
-                seen = rows[at + 1 - gathered : at + 1]
-                _add_rows(seen, missed[:gathered], information, score, block_scores[k // block])
-                begun = k + 1
+            if not keeps:
+                missed[at] = root * e if w > 0.0 else 0.0
+                if at + 1 == ROWS or (k + 1) % block == 0 or k == u.size - 1:
+                    _add_rows(rows, missed, at + 1, information, score, block_scores[k // block])
+                    begun = k + 1
         if k == u.size - 1:
             break
         jump = u[k] - v_last
         v_last = u[k]
-        parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
+        parts, h = (held_input.parts, 1) if passes_zero[k] else (1, 0)
         beta = h_s * b1[h, 0] + h_r * b1[h, 1]
         a11, a12, a21, a22, b11, b12 = ad[h, 0, 0], ad[h, 0, 1], ad[h, 1, 0], ad[h, 1, 1], b1[h, 0], b1[h, 1]
         b_iron = on_stator * b11 + on_rotor * b12
@@ -470,6 +484,26 @@ def simulate(
                 (slope_g * on_stator, slope_g * on_rotor),
             )
     return total
+
+
+@njit()
+def simulate(
+    measured: Measured,
+    held_input: Held,
+    machine: Machine,
+    shapes: Shapes,
+    own: Array,
+    delay: float,
+    asked: Asked,
+    is_linearised: bool,
+) -> float:
+    """Residuals y - i and the iron's flux; where `is_linearised`, normal equations and weighted sensitivities too, by the shared parameters
+    and the segment's `own` three. `delay` in periods. Returns sum W e^2, infinite where the model runs away.
+    """
+    cells = shapes.basis.shape[0]
+    powers, carried = np.zeros(machine.exponents.size + 1), np.zeros(12 * WIDTH)
+    room = Room(np.zeros(cells), np.zeros(cells), carried, powers, np.zeros(ROWS))
+    return _simulated(measured, held_input, machine, shapes, own, delay, asked, is_linearised, room)
 
 
 @njit()

@@ -226,9 +226,10 @@ class FluxGuard:
         difference = max(r.difference_wb for r in self._recent)
         rms = float(np.sqrt(np.mean(current_a**2)))
         explained = estimate.residual_rms_a < max(0.2 * rms, 3.0 * estimate.noise_a)
-        certain = estimate.std[0] < 0.1 * estimate.parameters.stator_resistance_ohm
-        certain &= estimate.std[3] < 0.2 * estimate.parameters.magnetizing_inductance_h
-        return bool(difference < AGREEMENT * self.limit_wb and explained and certain)
+        if not (difference < AGREEMENT * self.limit_wb and explained):
+            return False
+        r_s, _, _, l_m = estimate.parameters.as_tuple()
+        return estimate.std[0] < 0.1 * r_s and estimate.std[3] < 0.2 * l_m
 
     def _advise(
         self, fraction: float, current_fraction: float, agreed_wb: float, scale: float, permitted: float, time_s: float
