@@ -39,6 +39,8 @@ third of the batch fit's pass."""
 FAST: Any = {"fastmath": True, "error_model": "numpy", "nogil": True}
 kernel: Any = njit(**FAST)
 """Cached beside its file; other threads run meanwhile."""
+borrowing: Any = njit(**FAST, **BORROWED)
+"""The same of what is `BORROWED`."""
 inlined: Any = njit(inline="always", **FAST)
 """A part of a kernel too small to be called."""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 HOUSE = Path(__file__).parents[2] / "commissioner"
-COMPILED = {"kernel", "inlined", "njit", "_kernel", "_inlined"}
+COMPILED = {"kernel", "borrowing", "inlined", "njit", "_kernel", "_inlined"}
 OPTIONS = ("cli/app.py", "cli/groups/")
 """Verbs of the command line, whose parameters are its options."""
 MOST = 10

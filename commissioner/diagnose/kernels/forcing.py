@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from commissioner.compiled import kernel
+from commissioner.compiled import borrowing
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels import samples as row
 from commissioner.diagnose.kernels.memory import loop_width
@@ -22,13 +20,13 @@ INTO_FLUX = (
 )
 
 
-@kernel
+@borrowing
 def tilted(cosine, sine, a, b):
     """The tensor [c s; s -c] of an axis times (a, b)."""
     return cosine * a + sine * b, sine * a - cosine * b
 
 
-@kernel
+@borrowing
 def pushes(kind, n, span, trajectory, drive, channels, machine, asked, samples, into):
     """What one parameter, number `n` of its `kind`, pushes at each sample of `span` (start, stop); `trajectory`: states and stops."""
     start, stop = span
@@ -47,7 +45,6 @@ def pushes(kind, n, span, trajectory, drive, channels, machine, asked, samples, 
     las, lbs, mas, mbs = base[8], base[9], base[10], base[11]
     kappa, leak_ratio, coupled, splits_a, splits_b = base[12], base[13], base[14], base[15], base[16]
     shrink, over = 1.0 / (1.0 + g * rs), kappa - 1.0
-    volts = np.zeros(3)
     for m in range(1, stop - start + 1):
         t = start + m - 1
         held = max(t - 1, 0)
@@ -55,10 +52,13 @@ def pushes(kind, n, span, trajectory, drive, channels, machine, asked, samples, 
         waa, wab, wbb = rr * (1.0 + base[6]), rr * base[7], rr * (1.0 - base[6])
         ca, cb = at[row.CAGE_A, m], at[row.CAGE_B, m]
         if kind in (kinds.R_S, kinds.PHASE_RESISTANCE):
-            for leg in range(3):
-                share = phase_factor[held, leg] if kind == kinds.R_S else rs * channels[held, n + leg]
-                volts[leg] = -0.5 * share * (before[m, leg] + now[m, leg])
-            flux[0, m], flux[1, m] = (2.0 * volts[0] - volts[1] - volts[2]) / 3.0, (volts[1] - volts[2]) / SQRT3
+            if kind == kinds.R_S:
+                ru, rv, rw = phase_factor[held, 0], phase_factor[held, 1], phase_factor[held, 2]
+            else:
+                ru, rv, rw = rs * channels[held, n], rs * channels[held, n + 1], rs * channels[held, n + 2]
+            vu, vv = -0.5 * ru * (before[m, 0] + now[m, 0]), -0.5 * rv * (before[m, 1] + now[m, 1])
+            vw = -0.5 * rw * (before[m, 2] + now[m, 2])
+            flux[0, m], flux[1, m] = (2.0 * vu - vv - vw) / 3.0, (vv - vw) / SQRT3
             if kind == kinds.R_S:
                 terminal[0, m], terminal[1, m] = -g * at[row.AMP_A, m] * shrink, -g * at[row.AMP_B, m] * shrink
         elif kind in (kinds.R_R, kinds.ROTOR_MOD):
@@ -140,7 +140,7 @@ def pushes(kind, n, span, trajectory, drive, channels, machine, asked, samples, 
             rotor[0, m], rotor[1, m] = tilted(rr * splits_a, rr * splits_b, ca, cb)
 
 
-@kernel
+@borrowing
 def through_the_circuit(last, nu, shrink, cage_push, into):
     """What pushes inside the machine are at its terminals and in w, added to `terminal` and in place of `rotor`."""
     magnetizing, current, terminal, rotor = into.magnetizing, into.current, into.terminal, into.rotor

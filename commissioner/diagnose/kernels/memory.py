@@ -11,12 +11,12 @@ import math
 
 import numpy as np
 
-from commissioner.compiled import kernel
+from commissioner.compiled import borrowing, kernel
 
 MOST_STEPS_TO_REST, AT_REST_WB = 2000, 1e-9
 
 
-@kernel
+@borrowing
 def remembered(za, zb, da, db, radius):
     """State z after the input has moved straight by (da, db)."""
     if radius > 0.0:
@@ -63,7 +63,7 @@ def at_rest(pa, pb, z, stiffness, radius, l_m):
     return pa, pb
 
 
-@kernel
+@borrowing
 def loop_width(pa, pb, rate):
     """Factor on a memory current at flux (pa, pb), and its derivative by |flux|^2: `rate` |flux|^2 where loops widen with flux, as measured
     ones do below the knee; (1 + `rate` |flux|^2)^2, `rate` < 0, where they narrow, as the branches of a loop meet in saturation; else 1.
@@ -74,7 +74,7 @@ def loop_width(pa, pb, rate):
     return (power, rate) if rate > 0.0 else ((1.0 + power) ** 2, 2.0 * rate * (1.0 + power))
 
 
-@kernel
+@borrowing
 def susceptibility(za, zb, da, db, qa, qb, radius):
     """Derivative of `remembered` by (da, db), symmetric aa, ab, bb, and by (za, zb) likewise; (qa, qb) is the direction of
     motion where (da, db) is still zero.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from commissioner.compiled import kernel
+from commissioner.compiled import borrowing
 from commissioner.diagnose.kernels import samples as row
 
 
-@kernel
+@borrowing
 def forced(last, jump, has_flux, has_more, push, at, into, both, force):
     """What the pushes before and after each period do to the states at its end, (4, B+1); `both` (4, B+1) is room to work in."""
     terminal, flux, rotor = into.terminal, into.flux, into.rotor
@@ -30,7 +30,7 @@ def forced(last, jump, has_flux, has_more, push, at, into, both, force):
                 force[r, m] += push[r, 6, m] * flux[2, m] + push[r, 7, m] * flux[3, m]
 
 
-@kernel
+@borrowing
 def marched(first, last, x, matrices, force, terminal, out):
     """States (4,) marched through rows `first` ... `last` - 1, derivatives of the current into `out` (2, rows)."""
     step, amp = matrices.step, matrices.amp
@@ -47,7 +47,7 @@ def marched(first, last, x, matrices, force, terminal, out):
     x[0], x[1], x[2], x[3] = x0, x1, x2, x3
 
 
-@kernel
+@borrowing
 def marched_with_memory(first, last, circuit, branch, carried, matrices, samples, pushed, out):
     """As `marched`, a few parameters side by side (a processor overlaps them), where memory operators and rotor branches push on top.
 

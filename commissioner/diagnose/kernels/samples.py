@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.compiled import kernel
+from commissioner.compiled import borrowing
 from commissioner.diagnose.kernels.memory import loop_width, susceptibility
 from commissioner.diagnose.kernels.spline import blend, place, saturating
 from commissioner.diagnose.kernels.trajectory import EDDY, ROTOR, SQRT3, branch_current, leg_loss
@@ -20,14 +20,14 @@ derivative, current into the cage, derivative of all magnetizing currents, growt
 """
 
 
-@kernel
+@borrowing
 def _phases(a, b, out):
     out[0] = a
     out[1] = -0.5 * a + 0.5 * SQRT3 * b
     out[2] = -0.5 * a - 0.5 * SQRT3 * b
 
 
-@kernel
+@borrowing
 def _leg_path(i0, i1, top, knee, intervals, mean):
     """Mean B-spline weights (signed) of a leg along the straight path of its current from i0 to i1, into mean[:]."""
     near = min(abs(i0), abs(i1))
@@ -44,11 +44,12 @@ def _leg_path(i0, i1, top, knee, intervals, mean):
         mean[j + 3] += share * u * u * u
 
 
-@kernel
-def at_samples(start, stop, states, stop_states, drive, machine, working, wants_legs, samples):
+@borrowing
+def at_samples(start, stop, states, stop_states, drive, machine, working, wants_legs, samples, room):
     """(1)-(6) at samples `start` ... `stop` - 1 into columns 1 ... of `samples.at` and rows 1 ... of its others; 0 is the sample before.
 
-    A sample still belongs to the voltage of the period it ends. `working` (s,): the memory operators at work.
+    A sample still belongs to the voltage of the period it ends. `working` (s,): the memory operators at work. `room`: cells of the legs at a
+    link's voltage, and weights (3, width) of a leg's path, to work in.
     """
     voltage_a, voltage_b, voltage_factor = drive.voltage_a, drive.voltage_b, drive.voltage_factor
     link_factor, phase_factor = drive.link_factor, drive.phase_factor
@@ -67,9 +68,9 @@ def at_samples(start, stop, states, stop_states, drive, machine, working, wants_
     iaa, iab, ibb = gs * (1.0 + base[8]), gs * base[9], gs * (1.0 - base[8])
     has_link = legs_link.shape[0] > 0
     has_legs = has_link or legs.shape[0] > 0
-    legs_now = legs_link.copy() if has_link else legs
+    blended, mean = room
+    legs_now = blended if has_link else legs
     width = leg_mean.shape[2]
-    mean = np.zeros((3, width))
     linked = -1
     for t in range(start, stop):
         m = t - start + 1
@@ -150,7 +151,7 @@ def at_samples(start, stop, states, stop_states, drive, machine, working, wants_
             before[m],
         )
         if t == 0:
-            before[m] = now[m]
+            _phases(ta, tb, before[m])
         if has_link and (linked < 0 or link_factor[held] != link_factor[linked]):
             blend(legs, legs_link, link_factor[held], legs_now)
             linked = held

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.compiled import kernel
+from commissioner.compiled import borrowing
 
 Array = NDArray[np.float64]
 _TO_CELL = np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]) / 6.0
@@ -22,7 +22,7 @@ def cells_of(weights: Array) -> Array:
     return np.ascontiguousarray(near @ _TO_CELL.T)
 
 
-@kernel
+@borrowing
 def place(y, top, intervals):
     """Interval of y >= 0, and where in it: 0 ... 1, more beyond `top`."""
     s = min(y * (intervals / top), 1e9)
@@ -30,7 +30,7 @@ def place(y, top, intervals):
     return j, s - j
 
 
-@kernel
+@borrowing
 def blend(cells, more, factor, out):
     """cells + factor more, `cells` none where empty."""
     for j in range(more.shape[0]):
@@ -38,7 +38,7 @@ def blend(cells, more, factor, out):
             out[j, c] = factor * more[j, c] + (cells[j, c] if cells.shape[0] > 0 else 0.0)
 
 
-@kernel
+@borrowing
 def curve(cells, j, u):
     """Value of the curve at its place, linear beyond the last interval."""
     beyond = max(u - 1.0, 0.0)
@@ -47,14 +47,14 @@ def curve(cells, j, u):
     return value + beyond * rise(cells, j, u)
 
 
-@kernel
+@borrowing
 def rise(cells, j, u):
     """Slope of the curve at its place, per interval."""
     u = min(u, 1.0)
     return (3.0 * cells[j, 3] * u + 2.0 * cells[j, 2]) * u + cells[j, 1]
 
 
-@kernel
+@borrowing
 def saturating(a, b, cells, top):
     """Current S(|f|) f of a path with flux f = (a, b): its place, the current, and its derivative's aa, ab, bb."""
     size = np.sqrt(a * a + b * b) + 1e-12

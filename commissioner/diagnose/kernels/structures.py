@@ -44,6 +44,18 @@ class Machine(NamedTuple):
     branch_time: Array
 
 
+class Course(NamedTuple):
+    """A trajectory at its n samples: states (n + 1, order), those of the memory operators (n + 1, s, 2), terminal current (2, n), its slope
+    after and before each sample (2, n), and rotor current (2, n)."""
+
+    states: Array
+    stop_states: Array
+    current: Array
+    slope_after: Array
+    slope_before: Array
+    rotor_current: Array
+
+
 class Asked(NamedTuple):
     """The parameters (P,) whose derivatives are asked for: kinds and indices; B-spline weights of leg curves (K, width), cells of iron
     and leakage curves (K, intervals, 4), empty where no parameter needs them; d (psi_s, psi_R) / d parameter at the start (P, 4).

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.compiled import kernel
+from commissioner.compiled import borrowing
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels import samples as row
 from commissioner.diagnose.kernels.forcing import INTO_FLUX, pushes, through_the_circuit
@@ -33,17 +33,15 @@ SIDE_BY_SIDE = 4
 """Parameters marched at once where something remembers: one waits for its own sum, four fill the processor."""
 
 
-@kernel
-def _steps_of(start, stop, period, base, beta, at, secant, matrices):
-    """(8) solved for the end of the period before each sample, into `matrices`."""
+@borrowing
+def _steps_of(start, stop, period, base, beta, at, secant, matrices, room):
+    """(8) solved for the end of the period before each sample, into `matrices`; `room`: (4, 4), (2, 2), (4, 4)."""
     step, push, amp, cage, cage_push = matrices
     gs, gm, nu, g, kappa = base[2], base[3], base[4], base[5], base[12]
     shrink = 1.0 / (1.0 + g * base[0])
     half, over = 0.5 * period, kappa - 1.0
     iaa, iab, ibb = gs * (1.0 + base[8]), gs * base[9], gs * (1.0 - base[8])
-    back = np.zeros((4, 4))
-    v = np.zeros((2, 2))
-    whole = np.zeros((4, 4))
+    back, v, whole = room
     for m in range(1, stop - start + 1):
         jaa, jab, jbb = at[row.STEP_AA, m], at[row.STEP_AB, m], at[row.STEP_BB, m]
         eaa, eab, ebb = at[row.EXTRA_AA, m], at[row.EXTRA_AB, m], at[row.EXTRA_BB, m]
@@ -112,7 +110,7 @@ def _steps_of(start, stop, period, base, beta, at, secant, matrices):
                 push[r, 4 + c, m] = period * back[r, c]
 
 
-@kernel
+@borrowing
 def _solved(v, amp, cage, half, om, back):
     """Inverse (4, 4) of I - T/2 [V amp; -cage + omega J], by the Schur complement of the rotor block."""
     a00, a01 = (
@@ -145,63 +143,57 @@ def _solved(v, amp, cage, half, om, back):
         back[2, c], back[3, c] = i00 * ya + i01 * yb, i10 * ya + i11 * yb
 
 
-@kernel
 def sensitivities(trajectory, drive, channels, period, machine, asked, out):
     """Fills `out` (2, P, n): d i / d parameter at every sample, for what is `asked`; `trajectory`: states and stops of `propagate`."""
-    states, stop_states = trajectory
-    base, stop_gain, branch_gain, branch_time = (
-        machine.base,
-        machine.stop_gain,
-        machine.branch_gain,
-        machine.branch_time,
-    )
-    samples, count = drive.voltage_a.shape[0], asked.kinds.shape[0]
-    working = np.flatnonzero(stop_gain)
-    bars = np.flatnonzero((branch_gain != 0.0) & (branch_time > 0.0))
-    nu, half = base[4], 0.5 * period
-    shrink = 1.0 / (1.0 + base[5] * base[0])
-    wants_legs = asked.legs.shape[0] > 0
-    beta, branch = 0.0, np.zeros((bars.shape[0], 3))
-    for k, n in enumerate(bars):
-        h = half / branch_time[n]
-        beta += branch_gain[n] * h / (1.0 + h)
-        branch[k, 0], branch[k, 1], branch[k, 2] = (
-            branch_gain[n] * (1.0 - h) / (1.0 + h),
-            (1.0 - h) / (1.0 + h),
-            h / (1.0 + h),
-        )
-    has_memory = working.shape[0] + bars.shape[0] > 0
+    working = np.flatnonzero(machine.stop_gain)
+    bars = np.flatnonzero((machine.branch_gain != 0.0) & (machine.branch_time > 0.0))
+    half, count, width = 0.5 * period, asked.kinds.size, asked.legs.shape[1]
+    h = half / machine.branch_time[bars]
+    gain = machine.branch_gain[bars]
+    beta, branch = float(np.sum(gain * h / (1.0 + h))), np.empty((bars.size, 3))
+    branch[:, 0], branch[:, 1], branch[:, 2] = gain * (1.0 - h) / (1.0 + h), (1.0 - h) / (1.0 + h), h / (1.0 + h)
+    circuit = machine.base[4], 1.0 / (1.0 + machine.base[5] * machine.base[0]), beta
 
     # row 0 is the sample before the block
     rows = BLOCK + 1
-    at, memory = np.zeros((row.ROWS, rows)), np.zeros((rows, working.shape[0], 7))
-    before, now, secant, lost = np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
-    leg_mean = np.zeros((rows, 2, asked.legs.shape[1]))
-    step, push = np.zeros((rows, 4, 4)), np.zeros((4, 8, rows))
-    amp, cage, cage_push = np.zeros((rows, 2, 4)), np.zeros((rows, 2, 4)), np.zeros((rows, 7))
+    at, memory = np.zeros((row.ROWS, rows)), np.zeros((rows, working.size, 7))
+    before, now, secant, lost = (np.zeros((rows, 3)) for _ in range(4))
+    known = Samples(at, before, now, secant, np.zeros((rows, 2, width)), lost, memory)
+    amp, cage = np.zeros((rows, 2, 4)), np.zeros((rows, 2, 4))
+    matrices = Matrices(np.zeros((rows, 4, 4)), np.zeros((4, 8, rows)), amp, cage, np.zeros((rows, 7)))
     magnetizing, current, flux = np.zeros((2, rows)), np.zeros((2, rows)), np.zeros((4, rows))
     terminal, rotor = np.zeros((SIDE_BY_SIDE, 2, rows)), np.zeros((SIDE_BY_SIDE, 2, rows))
-    both, force = np.zeros((4, rows)), np.zeros((SIDE_BY_SIDE, 4, rows))
-
-    known = Samples(at, before, now, secant, leg_mean, lost, memory)
-    matrices = Matrices(step, push, amp, cage, cage_push)
+    pushing = magnetizing, current, flux, terminal, rotor
+    room = np.zeros((4, rows)), np.zeros((SIDE_BY_SIDE, 4, rows)), np.zeros((4, 4)), np.zeros((2, 2)), np.zeros((4, 4))
+    of_legs = machine.legs_link.copy(), np.zeros((3, width))
 
     # what a parameter takes from block to block: state, pushes into current and w, and those of what remembers
-    x, pushed, fed = asked.start.copy(), np.zeros((count, 4)), np.zeros((count, 4))
-    z, q = np.zeros((count, working.shape[0], 2)), np.zeros((count, bars.shape[0], 2))
-    moved, rate = np.zeros((count, 2)), np.zeros((count, 2))
-    own = (asked.kinds == kinds.NU).astype(np.float64)
-    for p in range(count):
-        for c in range(2):
-            moved[p, c] = (1.0 - nu) * x[p, 2 + c] + nu * x[p, c]
+    x, pushed = asked.start.copy(), np.zeros((count, 4))
+    carried = Carried(
+        own=(asked.kinds == kinds.NU).astype(np.float64), x=x, z=np.zeros((count, working.size, 2)), q=np.zeros((count, bars.size, 2)),
+        flux=(1.0 - circuit[0]) * x[:, 2:] + circuit[0] * x[:, :2], rate=np.zeros((count, 2)), fed=np.zeros((count, 4)),
+    )  # fmt: skip
+    given, made = (trajectory, drive, channels, machine, asked), (known, matrices, pushing, carried, pushed)
+    _sensitivities(given, period, (working, branch, circuit), made, room, of_legs, out)
 
+
+@borrowing
+def _sensitivities(given, period, remembering, made, room, of_legs, out):
+    """`remembering`: the memory operators at work (s,), of rotor branches what `marched_with_memory` says, and of the circuit; `made`: what is
+    known of a block, and of each parameter from block to block; the rest to work in."""
+    (trajectory, drive, channels, machine, asked), (working, branch, circuit) = given, remembering
+    known, matrices, (magnetizing, current, flux, terminal, rotor), carried, pushed = made
+    (states, stop_states), (both, force, back, v, whole), (nu, shrink, beta) = trajectory, room, circuit
+    at, amp, cage, x, base = known.at, matrices.amp, matrices.cage, carried.x, machine.base
+    samples, count, wants_legs = drive.voltage_a.shape[0], asked.kinds.shape[0], asked.legs.shape[0] > 0
+    has_memory = working.shape[0] + branch.shape[0] > 0
     for start in range(0, samples, BLOCK):
         stop = min(start + BLOCK, samples)
         last = stop - start + 1
         # the first sample of all ends no period
         first = 2 if start == 0 else 1
-        at_samples(start, stop, states, stop_states, drive, machine, working, wants_legs, known)
-        _steps_of(start, stop, period, base, beta, at, secant, matrices)
+        at_samples(start, stop, states, stop_states, drive, machine, working, wants_legs, known, of_legs)
+        _steps_of(start, stop, period, base, beta, at, known.secant, matrices, (back, v, whole))
         for group in range(0, count, SIDE_BY_SIDE):
             end = min(group + SIDE_BY_SIDE, count)
             for p in range(group, end):
@@ -212,21 +204,27 @@ def sensitivities(trajectory, drive, channels, period, machine, asked, out):
                 pushes(kind, asked.indices[p], span, trajectory, drive, channels, machine, asked, known, into)
                 has_flux, has_more = kind in INTO_FLUX, kind == kinds.R_S or kind not in INTO_FLUX
                 if has_more:
-                    through_the_circuit(last, nu, shrink, cage_push, into)
+                    through_the_circuit(last, nu, shrink, matrices.cage_push, into)
                 for c in range(2):
                     terminal[here, c, 0], rotor[here, c, 0] = pushed[p, c], pushed[p, 2 + c]
                     pushed[p, c], pushed[p, 2 + c] = terminal[here, c, last - 1], rotor[here, c, last - 1]
                 # the part of an iron-loss current that follows the voltage at once
                 jump = shrink if kind == kinds.IRON_LOSS else 0.0
-                forced(last, jump, has_flux, has_more, push, at, into, both, force[here])
+                forced(last, jump, has_flux, has_more, matrices.push, at, into, both, force[here])
                 if not has_memory:
                     marched(first, last, x[p], matrices, force[here], terminal[here], out[:, p, start:stop])
             if has_memory:
                 these = slice(group, end)
-                carried = Carried(own[these], x[these], z[these], q[these], moved[these], rate[these], fed[these])
-                circuit, more = (nu, shrink, beta), (force, terminal, rotor)
+                of_these = Carried(
+                    carried.own[these], x[these], carried.z[these], carried.q[these], carried.flux[these], carried.rate[these],
+                    carried.fed[these],
+                )  # fmt: skip
+                more = force, terminal, rotor
                 marched_with_memory(
-                    first, last, circuit, branch, carried, matrices, known, more, out[:, group:end, start:stop]
+                    first, last, circuit, branch, of_these, matrices, known, more, out[:, group:end, start:stop]
                 )
-        at[:, 0] = at[:, last - 1]
-        amp[0], cage[0] = amp[last - 1], cage[last - 1]
+        for r in range(row.ROWS):
+            at[r, 0] = at[r, last - 1]
+        for r in range(2):
+            for c in range(4):
+                amp[0, r, c], cage[0, r, c] = amp[last - 1, r, c], cage[last - 1, r, c]

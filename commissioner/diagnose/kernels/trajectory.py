@@ -28,16 +28,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.compiled import inlined, kernel
+from commissioner.compiled import borrowing, inlined, kernel
 from commissioner.diagnose.kernels.memory import loop_width, remembered, susceptibility
 from commissioner.diagnose.kernels.spline import blend, curve, place, rise, saturating
+from commissioner.diagnose.kernels.structures import Course
 
 SQRT3 = np.sqrt(3.0)
 ROTOR, EDDY = 1.0, -1.0
 """Sign of the time constants of rotor branches, and of eddy-current paths fed by the stator flux."""
 
 
-@kernel
+@borrowing
 def branch_current(x, branch_gain, branch_time, side):
     """Current (or its slope) of all branches on that `side`, from a state `x` (or its derivative)."""
     qa = qb = 0.0
@@ -48,7 +49,7 @@ def branch_current(x, branch_gain, branch_time, side):
     return qa, qb
 
 
-@kernel
+@borrowing
 def leg_loss(i, legs, top, knee):
     """Voltage a leg loses at current i (odd), and its slope: cells over asinh(|i|/knee)."""
     size = abs(i) / knee
@@ -163,7 +164,7 @@ def _current_slope(x, k, machine, paths, z):
     return da * shrink, db * shrink
 
 
-@kernel
+@borrowing
 def _steps_for_legs(current, rate, turn, period, machine, legs, fewest, most):
     """Steps fine enough for the steepest part of the leg curve that the currents (alpha, beta; with their slope) may meet in this period."""
     ia, ib = current
@@ -181,13 +182,34 @@ def _steps_for_legs(current, rate, turn, period, machine, legs, fewest, most):
     return max(fewest, min(most, int(steep * slope_gain * period / 0.3) + 1))
 
 
-@kernel
 def propagate(drive, period, substeps, crossing_substeps, machine, initial_state, initial_memory):
-    """Trajectory of one segment from `initial_state` (psi_s, psi_R) and what its iron remembers, `initial_memory` (s, 2).
+    """`Course` of one segment from `initial_state` (psi_s, psi_R) and what its iron remembers, `initial_memory` (s, 2)."""
+    order = 4 + 2 * machine.branch_gain.size
+    course = _course(drive.voltage_a.size, order, machine.stop_gain.size)
+    x, z, legs_now = np.zeros(order), initial_memory.copy(), machine.legs_link.copy()
+    x[:4] = initial_state
+    room = x, np.zeros(order), np.zeros(order), np.zeros(order), z, legs_now
+    _march(drive, period, (substeps, crossing_substeps), machine, room, course)
+    return course
 
-    Returns states (n+1, 4+2b), stops (n+1, s, 2) at the samples, terminal current (2, n), its slope after and before each sample
-    (2, n), and rotor current (2, n).
-    """
+
+def _course(samples, order, stops):
+    both = [np.zeros((2, samples)) for _ in range(4)]
+    return Course(np.zeros((samples + 1, order)), np.zeros((samples + 1, stops, 2)), *both)
+
+
+@borrowing
+def _kept(t, x, z, states, stop_states):
+    for c in range(x.shape[0]):
+        states[t, c] = x[c]
+    for s in range(z.shape[0]):
+        stop_states[t, s, 0], stop_states[t, s, 1] = z[s, 0], z[s, 1]
+
+
+@borrowing
+def _march(drive, period, steps_range, machine, room, course):
+    """`propagate` with its steps, fewest and most; `room`: state, three more of its size and the memory's, which are carried on, and cells of the
+    legs at the link's voltage."""
     voltage_a, voltage_b, voltage_factor, link_factor = (
         drive.voltage_a,
         drive.voltage_b,
@@ -196,21 +218,14 @@ def propagate(drive, period, substeps, crossing_substeps, machine, initial_state
     )
     phase_factor, rotor_factor, omega_rad_per_s = drive.phase_factor, drive.rotor_factor, drive.omega
     base, legs, legs_link = machine.base, machine.legs, machine.legs_link
-    stop_gain, stop_radius, branch_gain = machine.stop_gain, machine.stop_radius, machine.branch_gain
-    samples = voltage_a.shape[0]
-    stops = stop_gain.shape[0]
-    order = 4 + 2 * branch_gain.shape[0]
-    states = np.zeros((samples + 1, order))
-    stop_states = np.zeros((samples + 1, stops, 2))
-    current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
-    slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
-    x, y, k, total = np.zeros(order), np.zeros(order), np.zeros(order), np.zeros(order)
-    z = initial_memory.copy()
+    stop_gain, stop_radius = machine.stop_gain, machine.stop_radius
+    states, stop_states, current, slope_after, slope_before, rotor_current = course
+    (substeps, crossing_substeps), (x, y, k, total, z, blended) = steps_range, room
+    samples, stops, order = voltage_a.shape[0], stop_gain.shape[0], x.shape[0]
     nu, rs, r_r = base[4], base[0], base[1]
-    x[0:4] = initial_state
     has_link = legs_link.shape[0] > 0
     has_legs = has_link or legs.shape[0] > 0
-    legs_now = legs_link.copy() if has_link else legs
+    legs_now = blended if has_link else legs
     last_a = last_b = 0.0
     for t in range(samples):
         now_a, now_b = voltage_a[t] * voltage_factor[t], voltage_b[t] * voltage_factor[t]
@@ -220,13 +235,13 @@ def propagate(drive, period, substeps, crossing_substeps, machine, initial_state
         rr, om = r_r * rotor_factor[t], omega_rad_per_s[t]
         steps, h = 1, period
         step, stage = 0, -1
-        states[t] = x
-        stop_states[t] = z
+        _kept(t, x, z, states, stop_states)
         from_a, from_b = (1.0 - nu) * x[2] + nu * x[0], (1.0 - nu) * x[3] + nu * x[1]
         while step < steps:
             # stage -1: the state at the sample still belongs to the voltage of the period before
             if stage < 1:
-                y[:] = x
+                for c in range(order):
+                    y[c] = x[c]
             pa, pb = (1.0 - nu) * y[2] + nu * y[0], (1.0 - nu) * y[3] + nu * y[1]
             ma, mb = _memory_current(pa, pb, pa - from_a, pb - from_b, z, stop_gain, stop_radius)
             va, vb = (last_a, last_b) if stage < 0 else (now_a, now_b)
@@ -263,22 +278,25 @@ def propagate(drive, period, substeps, crossing_substeps, machine, initial_state
                 from_a, from_b = pa, pb
                 step, stage = step + 1, 0
         last_a, last_b = now_a, now_b
-    states[samples] = x
-    stop_states[samples] = z
-    return states, stop_states, current, slope_after, slope_before, rotor_current
+    _kept(samples, x, z, states, stop_states)
 
 
-@kernel
 def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, initial_state):
-    """The four-parameter model stepped exactly, the same four-by-four answers as `propagate`, states (n+1, 4).
+    """The four-parameter model stepped exactly, as `propagate`; no rotor current is told.
 
     `transition` (2, 2) and `gain` (2,) of (psi_s, psi_R) over one period; `output` (2,) gives i, `slope` (3,) di/dt from
     (psi_s, psi_R, v).
     """
+    course = _course(voltage_a.size, 4, 0)
+    _march_linear(voltage_a, voltage_b, (transition, gain, output, slope), initial_state, course)
+    return course
+
+
+@borrowing
+def _march_linear(voltage_a, voltage_b, exact, initial_state, course):
+    transition, gain, output, slope = exact
+    states, _, current, slope_after, slope_before, _ = course
     samples = voltage_a.shape[0]
-    states = np.zeros((samples + 1, 4))
-    current = np.zeros((2, samples))
-    slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
     for c in range(2):
         s, r = initial_state[c], initial_state[2 + c]
         last = 0.0
@@ -297,10 +315,9 @@ def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, init
             last = now
         states[samples, c] = s
         states[samples, 2 + c] = r
-    return states, current, slope_after, slope_before
 
 
-@kernel
+@borrowing
 def _rate(x, k, voltage, a, rr, omega, machine, current):
     """(3)-(7) without nonlinear terms: d x/dt into k, terminal current into `current`; `a` resistances aa, ab, bb."""
     base, branch_gain, branch_time = machine.base, machine.branch_gain, machine.branch_time
@@ -323,7 +340,7 @@ def _rate(x, k, voltage, a, rr, omega, machine, current):
     _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time)
 
 
-@kernel
+@borrowing
 def _add_eddy_slope(k, branch_gain, branch_time, shrink, slope, t):
     qa, qb = branch_current(k, branch_gain, branch_time, EDDY)
     slope[0, t] += shrink * qa
@@ -353,22 +370,28 @@ def _resistances(base, phase_factor, a):
     a[0], a[1], a[2] = (4.0 * ru + rv + rw) / 6.0, (rw - rv) / (2.0 * SQRT3), 0.5 * (rv + rw)
 
 
-@kernel
 def propagate_varying(drive, period, steps, order, whole_step, machine, initial_state):
     """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms; or where nothing
     varies the exact step itself, `whole_step` (size, size + 2) of states and held voltage (empty otherwise).
     """
+    size = 4 + 2 * machine.branch_gain.size
+    course = _course(drive.voltage_a.size, size, machine.stop_gain.size)
+    x = np.zeros(size)
+    x[:4] = initial_state
+    room = x, np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(3), np.zeros(2), np.zeros(2)
+    _march_varying(drive, period, steps, order, whole_step, machine, room, course)
+    return course
+
+
+@borrowing
+def _march_varying(drive, period, steps, order, whole_step, machine, room, course):
+    """`room`: state, two rates and a state to move to, resistances, two currents."""
     voltage_a, voltage_b, voltage_factor = drive.voltage_a, drive.voltage_b, drive.voltage_factor
     phase_factor, rotor_factor, omega_rad_per_s = drive.phase_factor, drive.rotor_factor, drive.omega
     base, branch_gain, branch_time = machine.base, machine.branch_gain, machine.branch_time
-    samples = voltage_a.shape[0]
-    size = 4 + 2 * branch_gain.shape[0]
-    states = np.zeros((samples + 1, size))
-    current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
-    slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
-    x, k, k_next, a = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(3)
-    i_now, unused, moved = np.zeros(2), np.zeros(2), np.zeros(size)
-    x[0:4] = initial_state
+    states, _, current, slope_after, slope_before, rotor_current = course
+    x, k, k_next, moved, a, i_now, unused = room
+    samples, size = voltage_a.shape[0], x.shape[0]
     h, is_exact = period / steps, whole_step.shape[0] > 0
     gs, shrink = base[2], 1.0 / (1.0 + base[5] * base[0])
     iaa, iab, ibb = gs * (1.0 + base[8]) * shrink, gs * base[9] * shrink, gs * (1.0 - base[8]) * shrink
@@ -377,7 +400,8 @@ def propagate_varying(drive, period, steps, order, whole_step, machine, initial_
         va, vb = voltage_a[t] * voltage_factor[t], voltage_b[t] * voltage_factor[t]
         _resistances(base, phase_factor[t], a)
         rr, omega = base[1] * rotor_factor[t], omega_rad_per_s[t]
-        states[t] = x
+        for c in range(size):
+            states[t, c] = x[c]
         _rate(x, k, (last_a, last_b), a, rr, omega, machine, i_now)
         for c in range(2):
             current[c, t] = i_now[c]
@@ -396,7 +420,8 @@ def propagate_varying(drive, period, steps, order, whole_step, machine, initial_
                     moved[r] = whole_step[r, size] * va + whole_step[r, size + 1] * vb
                     for c in range(size):
                         moved[r] += whole_step[r, c] * x[c]
-                x[:] = moved
+                for c in range(size):
+                    x[c] = moved[c]
                 break
             factor = h
             for j in range(order):
@@ -407,5 +432,5 @@ def propagate_varying(drive, period, steps, order, whole_step, machine, initial_
                     k, k_next = k_next, k
                     factor *= h / (j + 2.0)
         last_a, last_b = va, vb
-    states[samples] = x
-    return states, current, slope_after, slope_before, rotor_current
+    for c in range(size):
+        states[samples, c] = x[c]

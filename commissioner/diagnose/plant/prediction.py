@@ -135,22 +135,18 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
     acting |= {t.kind for t in asked} & {kinds.STOP, kinds.BRANCH}
     if all(k in (kinds.INITIAL_FLUX, kinds.CARRY) or k >= kinds.FIRST_OF_SENSING for k in acting):
         transition, gain, output, slope = exact_step(model.nominal, period)
-        states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
-        rotor = states[:-1, 2:4].T / model.nominal[3] - current
-        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine, at_work)
+        course = propagate_linear(va, vb, transition, gain, output, slope, start)
+        rotor = course.states[:-1, 2:4].T / model.nominal[3] - course.current
+        return Path(*course._replace(rotor_current=rotor), drive, machine, at_work)
     if not acting & kinds.NONLINEAR:
         rate = _fastest(model, machine.branch_gain, machine.branch_time) * period
         steps = max(int(np.ceil(rate)), 1) * layout.substeps
         whole = _whole_step(drive, period, machine)
-        states, current, after, before, rotor = propagate_varying(
-            drive, period, steps, _taylor_order(rate / steps), whole, machine, start
-        )
-        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine, at_work)
+        course = propagate_varying(drive, period, steps, _taylor_order(rate / steps), whole, machine, start)
+        return Path(*course, drive, machine, at_work)
     steps = _substeps(model, layout, segment, asked)
-    states, stops, current, after, before, rotor = propagate(
-        drive, period, steps, layout.crossing_substeps, machine, start, memory
-    )
-    return Path(states, stops, current, after, before, rotor, drive, machine, at_work)
+    course = propagate(drive, period, steps, layout.crossing_substeps, machine, start, memory)
+    return Path(*course, drive, machine, at_work)
 
 
 def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:

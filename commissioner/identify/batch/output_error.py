@@ -486,7 +486,6 @@ def _simulated(
     return total
 
 
-@njit()
 def simulate(
     measured: Measured,
     held_input: Held,
@@ -503,7 +502,7 @@ def simulate(
     cells = shapes.basis.shape[0]
     powers, carried = np.zeros(machine.exponents.size + 1), np.zeros(12 * WIDTH)
     room = Room(np.zeros(cells), np.zeros(cells), carried, powers, np.zeros(ROWS))
-    return _simulated(measured, held_input, machine, shapes, own, delay, asked, is_linearised, room)
+    return float(_simulated(measured, held_input, machine, shapes, own, delay, asked, is_linearised, room))
 
 
 @njit()

@@ -236,7 +236,7 @@ class Problem:
             is_linearised,
         )
         rows = self._rows[k]
-        if rows.shape[0] == residual.size:
+        if rows.shape[0] == residual.size and math.isfinite(squares):
             if is_linearised:
                 information += rows.T @ rows
             output_error.add_scores(rows, self.weights[k], residual, score, block, scores)

@@ -29,7 +29,7 @@ from commissioner.run.job import bounds, make_job, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load, load_procedure
-from commissioner.study import commissioning, workers
+from commissioner.study import commissioning, drawing, workers
 from commissioner.study.campaign import Studied, StudyRequest, carry_out
 from commissioner.study.commissioning import NoArchive
 from commissioner.study.looking import looked_at
@@ -428,7 +428,7 @@ def test_a_motor_file_is_a_motor_by_its_plate_and_a_scenario_file_is_moved(tmp_p
     for name, rated_w in (("motor_2kw2", 2200.0), ("config/motors/motor_2kw2.toml", 2200.0), (str(scenario), 7500.0)):
         path = study_file(tmp_path, motor.format(name))
         (case,) = cases_of(load(path, Specification), path, simulator().motors())
-        drawn, other = commissioning._drawn(case), commissioning._drawn(replace(case, seed=case.seed + 1))
+        drawn, other = drawing.draw(case), drawing.draw(replace(case, seed=case.seed + 1))
         assert (drawn.motor, drawn.plate["rated_power_w"]) == (name, rated_w)
         assert drawn.plate == other.plate
         assert drawn.document["sensors"]["noise_a"] == 0.05
