@@ -24,7 +24,7 @@ from commissioner.diagnose.kernels import samples as row
 from commissioner.diagnose.kernels.forcing import INTO_FLUX, pushes, through_the_circuit
 from commissioner.diagnose.kernels.recursion import forced, marched, marched_with_memory
 from commissioner.diagnose.kernels.samples import at_samples
-from commissioner.diagnose.kernels.structures import Carried, Matrices, Pushes, Samples
+from commissioner.diagnose.kernels.structures import Array, Asked, Carried, Drive, Machine, Matrices, Pushes, Samples
 from commissioner.diagnose.kernels.trajectory import SQRT3
 
 BLOCK = 256
@@ -143,7 +143,15 @@ def _solved(v, amp, cage, half, om, back):
         back[2, c], back[3, c] = i00 * ya + i01 * yb, i10 * ya + i11 * yb
 
 
-def sensitivities(trajectory, drive, channels, period, machine, asked, out):
+def sensitivities(
+    trajectory: tuple[Array, Array],
+    drive: Drive,
+    channels: Array,
+    period: float,
+    machine: Machine,
+    asked: Asked,
+    out: Array,
+) -> None:
     """Fills `out` (2, P, n): d i / d parameter at every sample, for what is `asked`; `trajectory`: states and stops of `propagate`."""
     working = np.flatnonzero(machine.stop_gain)
     bars = np.flatnonzero((machine.branch_gain != 0.0) & (machine.branch_time > 0.0))

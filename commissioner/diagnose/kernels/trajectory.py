@@ -31,7 +31,7 @@ import numpy as np
 from commissioner.compiled import borrowing, inlined, kernel
 from commissioner.diagnose.kernels.memory import loop_width, remembered, susceptibility
 from commissioner.diagnose.kernels.spline import blend, curve, place, rise, saturating
-from commissioner.diagnose.kernels.structures import Course
+from commissioner.diagnose.kernels.structures import Array, Course, Drive, Machine
 
 SQRT3 = np.sqrt(3.0)
 ROTOR, EDDY = 1.0, -1.0
@@ -182,7 +182,15 @@ def _steps_for_legs(current, rate, turn, period, machine, legs, fewest, most):
     return max(fewest, min(most, int(steep * slope_gain * period / 0.3) + 1))
 
 
-def propagate(drive, period, substeps, crossing_substeps, machine, initial_state, initial_memory):
+def propagate(
+    drive: Drive,
+    period: float,
+    substeps: int,
+    crossing_substeps: int,
+    machine: Machine,
+    initial_state: Array,
+    initial_memory: Array,
+) -> Course:
     """`Course` of one segment from `initial_state` (psi_s, psi_R) and what its iron remembers, `initial_memory` (s, 2)."""
     order = 4 + 2 * machine.branch_gain.size
     course = _course(drive.voltage_a.size, order, machine.stop_gain.size)
@@ -193,7 +201,7 @@ def propagate(drive, period, substeps, crossing_substeps, machine, initial_state
     return course
 
 
-def _course(samples, order, stops):
+def _course(samples: int, order: int, stops: int) -> Course:
     both = [np.zeros((2, samples)) for _ in range(4)]
     return Course(np.zeros((samples + 1, order)), np.zeros((samples + 1, stops, 2)), *both)
 
@@ -281,7 +289,15 @@ def _march(drive, period, steps_range, machine, room, course):
     _kept(samples, x, z, states, stop_states)
 
 
-def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, initial_state):
+def propagate_linear(
+    voltage_a: Array,
+    voltage_b: Array,
+    transition: Array,
+    gain: Array,
+    output: Array,
+    slope: Array,
+    initial_state: Array,
+) -> Course:
     """The four-parameter model stepped exactly, as `propagate`; no rotor current is told.
 
     `transition` (2, 2) and `gain` (2,) of (psi_s, psi_R) over one period; `output` (2,) gives i, `slope` (3,) di/dt from
@@ -370,7 +386,9 @@ def _resistances(base, phase_factor, a):
     a[0], a[1], a[2] = (4.0 * ru + rv + rw) / 6.0, (rw - rv) / (2.0 * SQRT3), 0.5 * (rv + rw)
 
 
-def propagate_varying(drive, period, steps, order, whole_step, machine, initial_state):
+def propagate_varying(
+    drive: Drive, period: float, steps: int, order: int, whole_step: Array, machine: Machine, initial_state: Array
+) -> Course:
     """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms; or where nothing
     varies the exact step itself, `whole_step` (size, size + 2) of states and held voltage (empty otherwise).
     """
