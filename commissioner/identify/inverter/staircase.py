@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,7 +177,7 @@ def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
             limit="3 levels, 2 of one sign",
             remedy="raise the DC levels or the current limit",
         )
-    fits = [_fit_shape(levels, axis_deg, tail, largest, 0 < positive < len(carrying)) for tail in TAILS]
+    fits = [_fit_shape(tuple(levels), axis_deg, tail, largest, 0 < positive < len(carrying)) for tail in TAILS]
     best = min(fits, key=lambda f: f.misfit)
     weights = np.array([math.exp(-0.5 * max(len(levels) - 4, 1) * (f.misfit / best.misfit - 1.0)) for f in fits])
     weights /= weights.sum()
@@ -209,9 +210,11 @@ class _ShapeFit:
     misfit: float
 
 
+@lru_cache(maxsize=4 * len(TAILS))
 def _fit_shape(
-    levels: Sequence[DcLevel], axis_deg: float, tail: float, largest: float, has_both_signs: bool
+    levels: tuple[DcLevel, ...], axis_deg: float, tail: float, largest: float, has_both_signs: bool
 ) -> _ShapeFit:
+    """Kept: every look of a run sees the staircase of its first test again."""
     from scipy.optimize import least_squares
 
     voltage = np.array([level.voltage_v for level in levels])
