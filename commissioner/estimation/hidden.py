@@ -19,14 +19,15 @@ Array = NDArray[np.float64]
 class Hidden:
     """`usual`: its size's standard deviation beforehand where a recording tells nothing, 0 of what is not in every motor, or draws nothing
     aside unseen; `of_law`: of what it moved, by one standard deviation, for its law is not known. `powers`: further numbers of its law, which count
-    together with the size; `shapes`: others of it, free once it has a size. Causes of the same words are forms of one, and the one that fits best
-    is it."""
+    together with the size, and where `is_either` each tell it alone; `shapes`: others of it, free once it has a size. Causes of the same words are
+    forms of one, and the one that fits best is it."""
 
     words: str
     size: str
     usual: float = 0.0
     of_law: float = 0.0
     powers: tuple[str, ...] = ()
+    is_either: bool = False
     shapes: tuple[str, ...] = ()
     corner: str = ""
     corners: tuple[float, ...] = ()
@@ -38,6 +39,11 @@ class Hidden:
     def names(self) -> tuple[str, ...]:
         """Of the numbers that are fitted for it."""
         return (self.size, *self.powers, *self.shapes, *([self.corner] if self.corner else []))
+
+    @property
+    def told_by(self) -> tuple[str, ...]:
+        """By which of them it is seen."""
+        return (self.size, *self.powers) if self.is_either else (self.size,)
 
 
 HIDDEN = (
@@ -59,8 +65,7 @@ HIDDEN = (
         Hidden("saturation of the leakage", size, shapes=("leakage_knee", "leakage_bend"))
         for size in ("leakage_softness", "rotor_leakage_softness")
     ),
-    Hidden("heating of the windings", "stator_heat", usual=0.01, powers=("rotor_heat",)),
-    Hidden("heating of the windings", "rotor_heat", usual=0.01, powers=("stator_heat",)),
+    Hidden("heating of the windings", "stator_heat", usual=0.01, powers=("rotor_heat",), is_either=True),
     *(Hidden("unlike gains of the voltages", f"voltage_gain_{part}", usual=0.001, has_sign=True, is_sought=False) for part in ("re", "im")),
 )  # fmt: skip
 """Usual sizes: a loss of 2 % of rated apparent power, bars that double R_R at starting slip, gains of three voltages that make 0.1 % of unbalance. In one steady load nothing is left of either: with a second
@@ -175,9 +180,9 @@ def _best(problem: Problem, fit: Fit, hidden: Hidden) -> tuple[float, Machine]:
     machines = _at_corners(fit.machine, hidden)
     gains = []
     for machine in machines:
-        own, _ = _beside(problem, fit, machine, [Column("p", AT[hidden.size])])
-        along = float((own @ fit.rest)[0])
-        gains.append(along**2 / max(float(np.sum(own**2)), 1e-300) if hidden.has_sign or along > 0.0 else 0.0)
+        own, _ = _beside(problem, fit, machine, [Column("p", AT[name]) for name in hidden.told_by])
+        along, squares = own @ fit.rest, np.maximum(np.sum(own**2, axis=1), 1e-300)
+        gains.append(float(np.max(np.where(hidden.has_sign | (along > 0.0), along**2 / squares, 0.0))))
     best = int(np.argmax(gains))
     return gains[best], machines[best]
 
@@ -199,13 +204,11 @@ def drawn_aside(problem: Problem, fit: Fit) -> Array:
     Its size is what a usual one and the residual tell together (a Gaussian prior, and what its sensitivity has that the columns do not
     take up): a start tells the bars, one steady load leaves them as they are usual. Of several corners the one that the residual tells best.
     """
-    moves = [np.zeros((0, len(fit.columns)))]
-    for hidden in HIDDEN:
-        if not hidden.usual or hidden in told_in(fit):
-            continue
+    moves, told = [np.zeros((0, len(fit.columns)))], told_in(fit)
+    for hidden, name in ((h, name) for h in HIDDEN if h.usual and h not in told for name in h.told_by):
         tried = []
         for machine in _at_corners(fit.machine, hidden):
-            own, taken = _beside(problem, fit, machine, [Column("p", AT[hidden.size])])
+            own, taken = _beside(problem, fit, machine, [Column("p", AT[name])])
             size2 = 1.0 / (1.0 / hidden.usual**2 + float(np.sum(own**2)) / fit.scale)
             found = size2 * float((own @ fit.rest)[0]) / fit.scale
             tried.append((found**2 / size2, np.sqrt(found**2 + size2) * taken))
