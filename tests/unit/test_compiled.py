@@ -6,9 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
-from commissioner.compiled import forget_stale_kernels
+from commissioner.compiled import BORROWED, forget_stale_kernels
 
 HOUSE = Path(__file__).parents[2]
 NAMES = ("kernels/one.py", "kernels/two.py", "numbers.py")
@@ -45,6 +47,21 @@ def test_a_folder_without_a_cache_is_left_alone(tmp_path):
     (tmp_path / "kernels").mkdir()
     (tmp_path / "numbers.py").touch()
     forget_stale_kernels(str(tmp_path / "kernels"), "numbers.py")
+
+
+def test_what_borrows_its_arrays_may_make_none():
+    @numba.njit(**BORROWED)
+    def makes(n):
+        return np.zeros(n).sum()
+
+    @numba.njit(**BORROWED)
+    def lends(rows):
+        return rows[1].sum()
+
+    assert numba.njit(makes.py_func)(3) == 0.0
+    with pytest.raises(numba.errors.NumbaError):
+        makes(3)
+    assert lends(np.ones((2, 3))) == 3.0
 
 
 def compiling(package):
