@@ -20,7 +20,7 @@ from sim.drive.parameters import ParameterSet
 from sim.drive.samples import VOLTAGE_STEP_V, SampleRing, link_step_v
 from sim.drive.states import Setup, State, Trip
 from sim.physics import layout as at
-from sim.physics.kernel import coast
+from sim.physics.kernel import coast, scratch
 from sim.physics.machine import COPPER_PER_K, Plant
 from sim.physics.packing import fresh_state, pack
 from sim.wire.state_log import StateLog
@@ -36,7 +36,7 @@ def warm_up(plant: Plant, drive_map: DriveMap) -> None:
     x, e, ring = fresh_state(p), np.zeros(at.E_COUNT), SampleRing(drive_map, 16, 1, 1)
     e[[at.E_STEP_V, at.E_DURATION, at.E_TIME_LIMIT]] = 1.0
     white, trip = np.zeros((1, 4)), np.zeros(1)
-    run_interrupts(1, x, p, e, s, ring.c, white, ring.history, ring.means, ring.ring, ring.flags, trip)
+    run_interrupts(1, x, p, e, s, ring.c, white, ring.history, ring.means, ring.ring, ring.flags, trip, scratch())
     coast(x, p, 0.001)
     crc16(np.zeros(1, np.int64))
     ring.window(0, 1, 0, 0, is_running=False)
@@ -109,7 +109,7 @@ class Firmware:
 
     def _new_session(self) -> None:
         v = self.values
-        self.e, self.trip_current = np.zeros(at.E_COUNT), np.zeros(1)
+        self.e, self.trip_current, self._work = np.zeros(at.E_COUNT), np.zeros(1), scratch()
         self.samples = SampleRing(self.map, self.setup.ring_capacity, v["channel_mask"], v["decimation"])
 
     # --- time ---------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ class Firmware:
         ring = self.samples
         run_interrupts(
             periods, self.x, self.p, self.e, self.s, ring.c, white, ring.history, ring.means, ring.ring, ring.flags,
-            self.trip_current,
+            self.trip_current, self._work,
         )  # fmt: skip
         self._supervise()
         self._happen()

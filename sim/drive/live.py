@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from sim.physics import layout as at
-from sim.physics.compiled import kernel
-from sim.physics.kernel import advance_period, all_currents, load, scratch
+from sim.physics.compiled import kernel, lent
+from sim.physics.kernel import advance_period, all_currents, load
 from sim.physics.sensing import between, convert, phase_of, sense
 
 HISTORY = 16
@@ -70,15 +70,14 @@ def _delayed(history, k, delay_periods):
     return between(points, place)
 
 
-@kernel
-def run_interrupts(n, x, p, e, s, c, white, history, means, ring, flags, trip):
+@lent
+def run_interrupts(n, x, p, e, s, c, white, history, means, ring, flags, trip, work):
     """Up to `n` control periods; returns how many ran. Stops early by itself with the reason in c[C_STOP].
 
     x, p machine; e excitation; s sensing; c int64 counters; white (n, 4) normals; history (HISTORY, POINTS, 2);
     means (CHANNELS,) sums of the sample in the making; ring (capacity, CHANNELS) int16; flags (capacity,) uint8;
-    trip (1,) the measured current that tripped.
+    trip (1,) the measured current that tripped; work as of `scratch`.
     """
-    work = scratch()
     axis = (math.cos(e[at.E_AXIS_RAD]), math.sin(e[at.E_AXIS_RAD]))
     period = p[at.P_PERIOD]
     grid = e[at.E_STEP_V]

@@ -36,5 +36,7 @@ def cached(**options):
 
 
 kernel = cached(error_model="numpy", fastmath=FAST)
+lent = cached(error_model="numpy", fastmath=FAST, _nrt=False)
+"""The same for one that makes no array: numba does not count who holds those it is lent."""
 piece = njit(forceinline=True, error_model="numpy", fastmath=FAST)
 """A part of a kernel too small to be called: it is written into its callers by the compiler."""
