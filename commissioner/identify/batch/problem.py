@@ -25,9 +25,7 @@ CURRENT_MARGIN = 1.5
 NEAR_ZERO, NEAR_ZERO_WHEN_LATE = 0.03, 0.25
 """Currents, of the largest, below which a period is taken in parts. Where the voltage arrives late, the current bends inside
 the period and the loss, while it still rises, does not see the mean of its ends: L_M 1.6 %, R_R 0.5 % off at 150 of 200 us."""
-PARTS, COARSE_PARTS = 4, 2
-"""Of such a period, and while models are compared: of 32 the currents differ by 0.0013 of the noise at most, and by 0.006 (13 fits of the default
-scenario), L_sigma by 0.04 and by 0.13 of its standard error."""
+
 
 MOST_KEPT = 4_000_000
 """Sensitivities that are kept for what is evaluated near by, 32 MB: a longer record is linearised at every step."""
@@ -53,7 +51,7 @@ class Evaluation:
 
 class Problem:
     """The joint least-squares problem: shared parameters first, then three of each segment. `is_coarse`: for comparing
-    models; only periods in which the current passes zero are done in parts, and in fewer."""
+    models; only periods in which the current passes zero are done in parts."""
 
     def __init__(
         self, segments: Sequence[Segment], period_s: float, model: ModelChoice, *, is_coarse: bool = False
@@ -69,7 +67,6 @@ class Problem:
         self.current_span_a = CURRENT_MARGIN * max(peak(s.current_a) for s in segments)
         self.bases = [self._basis(s.axis_deg) for s in segments]
         self.integrals = [_from_zero(b) for b in self.bases]
-        self.parts = COARSE_PARTS if is_coarse else PARTS
         near = NEAR_ZERO_WHEN_LATE if model.with_delay and not is_coarse else NEAR_ZERO
         self.passes_zero = [self._passes_zero(s.current_a, near) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
@@ -106,9 +103,9 @@ class Problem:
 
     def _held(self, circuit: Matrix, *, is_linearised: bool) -> Held:
         """Responses and derivatives (zero where nothing is linearised) over a period and over a part of one, stacked."""
-        periods = (self.period_s / parts for parts in (1, self.parts))
+        periods = (self.period_s / parts for parts in (1, output_error.PARTS))
         both = (_held_with_derivatives(circuit, period_s, is_linearised=is_linearised) for period_s in periods)
-        return Held(self.parts, *(np.stack(pair) for pair in zip(*both, strict=True)))
+        return Held(*(np.stack(pair) for pair in zip(*both, strict=True)))
 
     def expect_leg(self, theta: Matrix) -> None:
         """Of the leg error is expected what its kind allows at the plateau it has in `theta`."""
