@@ -33,7 +33,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 BORROWED: Any = {"_nrt": False}
-"""Of a kernel that makes no array and takes none from a tuple that outlives it: what it is given is its caller's, who keeps it. numba
+"""Of a kernel that makes no array: those it is given are its caller's, who keeps them. Else numba
 counts references at every tuple that is taken apart and every row that is looked at, two calls of an atomic instruction each: a
 third of the batch fit's pass."""
 FAST: Any = {"fastmath": True, "error_model": "numpy", "nogil": True}

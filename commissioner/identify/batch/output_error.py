@@ -38,8 +38,6 @@ R_s 0.97 % off at 0.18 stated for 0.66 at 0.88 (`tests.campaigns.inverter 1 318`
 _SOLVED = 1e-9
 """Of the current's span: what the implicit step may miss its current by."""
 _MOST_STEPS = 40
-ROWS = 256
-"""Weighted sensitivities gathered before they are multiplied."""
 WIDTH = 32
 """Room for the numbers of one kind, one behind the other in one array: at constant distances the compiler sees that they are apart."""
 _S1, _S2, _SI, _DG, _DG_LAST, _PUSHED, _PUSHED_R, _TO_S1, _TO_S2, _TO_I, _TO_G, _WANTED = range(0, 12 * WIDTH, WIDTH)
@@ -98,7 +96,7 @@ class Shapes(NamedTuple):
 class Asked(NamedTuple):
     """What is asked for, and where it goes: `wanted` (p,) is 1 where a sensitivity is to be carried; J^T W J and J^T W e are added to
     `information` (p, p) and `score` (p,), the latter also by stretches of `block` samples to `block_scores`; `residual`, `flux` of the iron (n,); `rows`
-    for the weighted sensitivities: of a stretch; or of every sample where it has (n, p), and nothing is added: `add_scores` does for any
+    for the weighted sensitivities: of a sample; or of every one where it has (n, p), and nothing is added: `add_scores` does for any
     residuals, and numpy makes half the product."""
 
     wanted: Array
@@ -112,14 +110,17 @@ class Asked(NamedTuple):
 
 
 class Room(NamedTuple):
-    """To work in, zeros: F and its integral as in `Loss` (rows,), what is carried on (12 WIDTH,), powers of the iron's flux (m + 1,), residuals of a
-    stretch (ROWS,)."""
+    """To work in, zeros: F and its integral as in `Loss` (rows,), what is carried on (12 WIDTH,), powers of the iron's flux (m + 1,)."""
 
     table: Array
     integral: Array
     carried: Array
     power: Array
-    missed: Array
+
+    @classmethod
+    def of(cls, machine: Machine, shapes: Shapes) -> Room:
+        table, integral = np.zeros((2, shapes.basis.shape[0]))
+        return cls(table, integral, np.zeros(12 * WIDTH), np.zeros(machine.exponents.size + 1))
 
 
 @njit(**BORROWED)
@@ -275,14 +276,13 @@ def _push_of_loss(
 
 
 @njit(inline="always")
-def _add_rows(rows: Array, missed: Array, count: int, information: Array, score: Array, block_score: Array) -> None:
-    """Of the first `count` weighted sensitivities (rows, p) and residuals (rows,) what they add to the normal equations."""
-    for r in range(count):
-        for i in range(score.size):
-            score[i] += missed[r] * rows[r, i]
-            block_score[i] += missed[r] * rows[r, i]
-            for j in range(score.size):
-                information[i, j] += rows[r, i] * rows[r, j]
+def _add_row(row: Array, missed: float, information: Array, score: Array, block_score: Array) -> None:
+    """What a sample's weighted sensitivities (p,) and residual add to the normal equations."""
+    for i in range(score.size):
+        score[i] += missed * row[i]
+        block_score[i] += missed * row[i]
+        for j in range(score.size):
+            information[i, j] += row[i] * row[j]
 
 
 @njit(inline="always")
@@ -337,7 +337,7 @@ def _add_directly(
 
 
 @njit(fastmath={"contract", "reassoc", "nsz", "arcp"}, **BORROWED)
-def _simulated(
+def simulate(
     measured: Measured,
     held_input: Held,
     machine: Machine,
@@ -348,6 +348,9 @@ def _simulated(
     is_linearised: bool,
     room: Room,
 ) -> float:
+    """Residuals y - i and the iron's flux; where `is_linearised`, normal equations and weighted sensitivities too, by the shared parameters
+    and the segment's `own` three. `delay` in periods. Returns sum W e^2, infinite where the model runs away.
+    """
     theta = machine.theta
     u, y, weight, passes_zero = measured.u, measured.y, measured.weight, measured.passes_zero
     ad, b1, b2, b_r = held_input.ad, held_input.b1, held_input.b2, held_input.b_r
@@ -388,7 +391,7 @@ def _simulated(
         dg[j] = slope_g * (on_stator * s1[j] + on_rotor * s2[j]) + to_g[j]
         si[j] = h_s * s1[j] + h_r * s2[j] + on_stator * (dg[j] - to_g[j]) + to_i[j]
         m[_DG_LAST + j] = dg[j]
-    missed, begun, keeps = room.missed, 0, rows.shape[0] == u.size
+    keeps = rows.shape[0] == u.size
     total, v_last, last_parts = 0.0, measured.u_before, 1
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
@@ -397,15 +400,12 @@ def _simulated(
         w = weight[k]
         total += w * e * e if w > 0.0 else 0.0
         if is_linearised:
-            root, at = np.sqrt(w), (k if keeps else k - begun)
+            root, at = np.sqrt(w), (k if keeps else 0)
             for j in range(p):
                 rows[at, j] = root * si[j]
             rows[at, first_own] = root * wanted[first_own]
             if not keeps:
-                missed[at] = root * e if w > 0.0 else 0.0
-                if at + 1 == ROWS or (k + 1) % block == 0 or k == u.size - 1:
-                    _add_rows(rows, missed, at + 1, information, score, block_scores[k // block])
-                    begun = k + 1
+                _add_row(rows[at], root * e if w > 0.0 else 0.0, information, score, block_scores[k // block])
         if k == u.size - 1:
             break
         jump = u[k] - v_last
@@ -486,25 +486,6 @@ def _simulated(
                 (slope_g * on_stator, slope_g * on_rotor),
             )
     return total
-
-
-def simulate(
-    measured: Measured,
-    held_input: Held,
-    machine: Machine,
-    shapes: Shapes,
-    own: Array,
-    delay: float,
-    asked: Asked,
-    is_linearised: bool,
-) -> float:
-    """Residuals y - i and the iron's flux; where `is_linearised`, normal equations and weighted sensitivities too, by the shared parameters
-    and the segment's `own` three. `delay` in periods. Returns sum W e^2, infinite where the model runs away.
-    """
-    cells = shapes.basis.shape[0]
-    powers, carried = np.zeros(machine.exponents.size + 1), np.zeros(12 * WIDTH)
-    room = Room(np.zeros(cells), np.zeros(cells), carried, powers, np.zeros(ROWS))
-    return float(_simulated(measured, held_input, machine, shapes, own, delay, asked, is_linearised, room))
 
 
 @njit()

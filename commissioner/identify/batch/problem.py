@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from commissioner.identify.batch import modal, output_error
 from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, SHARED, SPLIT, Matrix, ModelChoice
-from commissioner.identify.batch.output_error import ROWS, Asked, Held, Machine, Measured, Shapes
+from commissioner.identify.batch.output_error import Asked, Held, Machine, Measured, Room, Shapes
 from commissioner.identify.batch.segments import TABLE_ROWS, Segment
 from commissioner.records import Signal, peak
 
@@ -222,15 +222,18 @@ class Problem:
         wanted = self.free[self.columns[k]].astype(np.float64)
         information, score, block, scores, residual, _ = shared
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
+        machine = Machine(theta, np.array(model.exponents, dtype=np.int64), model.flux_scale_wb)
+        shapes = Shapes(self.bases[k], self.integrals[k], self.current_span_a)
         squares = output_error.simulate(
             Measured(segment.voltage_v, before, segment.current_a, self.weights[k], self.passes_zero[k]),
             held,
-            Machine(theta, np.array(model.exponents, dtype=np.int64), model.flux_scale_wb),
-            Shapes(self.bases[k], self.integrals[k], self.current_span_a),
+            machine,
+            shapes,
             own,
             theta[DELAY] / self.period_s,
             Asked(wanted, *shared, self._rows[k]),
             is_linearised,
+            Room.of(machine, shapes),
         )
         rows = self._rows[k]
         if rows.shape[0] == residual.size and math.isfinite(squares):
@@ -240,9 +243,9 @@ class Problem:
         return float(squares)
 
     def _room(self) -> list[Matrix]:
-        """For the sensitivities of every sample, or where these are too many of a stretch."""
+        """For the sensitivities of every sample, or where these are too many of one."""
         width = self.model.size + OWN
-        return [np.empty((s.current_a.size if self._keeps else ROWS, width)) for s in self.segments]
+        return [np.empty((s.current_a.size if self._keeps else 1, width)) for s in self.segments]
 
 
 def beginnings(segments: Sequence[Segment], model: ModelChoice) -> Sequence[Segment]:
