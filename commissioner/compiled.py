@@ -55,9 +55,14 @@ if hasattr(os, "register_at_fork"):  # they stay behind in the parent
     os.register_at_fork(after_in_child=threads.cache_clear)
 
 
+_FLOAT = np.dtype(np.float64)
+
+
 def writable(signal: ArrayLike) -> NDArray[np.float64]:
     """As compiled code takes it: contiguous, and writable, for another signature (columns of a file are read-only) is
     compiled anew."""
+    if isinstance(signal, np.ndarray) and signal.dtype is _FLOAT and signal.flags.carray:
+        return signal
     return np.require(signal, np.float64, ["C", "W"])
 
 

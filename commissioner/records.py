@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -41,7 +42,7 @@ DiagnosisVerdict = Literal["explained", "nothing_significant", "not_distinguisha
 
 def peak(signal: Signal) -> float:
     """The largest magnitude; NaN where there is one."""
-    return float(np.abs(signal).max())
+    return float(np.maximum.reduce(np.abs(signal), axis=None))
 
 
 RPM = 30.0 / np.pi
@@ -98,9 +99,15 @@ class SampleBlock:
     unit_v: float = 0.0
     unit_a: float = 0.0
 
-    @property
+    @cached_property
     def count(self) -> int:
         return int(self.current_u_a.shape[0])
+
+    def aged(self, age_s: float) -> SampleBlock:
+        """The same samples, of this age: as `dataclasses.replace`, which takes as long as decoding them did."""
+        block = object.__new__(type(self))
+        block.__dict__.update(self.__dict__, age_s=age_s)
+        return block
 
 
 UNUSED_VOLTAGE = "unused_voltage"

@@ -7,6 +7,7 @@ counted from phase u towards phase v. Signals are `(n,)`, SI units.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,6 +31,7 @@ def orthogonal_current_a(
     return axis_current_a(current_u_a, current_v_a, current_w_a, axis_deg + 90.0)
 
 
+@lru_cache(maxsize=64)
 def phase_cosines(axis_deg: float) -> tuple[float, float, float]:
     """What of an axis current flows in each phase: cos(theta), cos(theta - 120 deg), cos(theta + 120 deg).
 

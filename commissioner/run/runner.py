@@ -92,7 +92,7 @@ class Runner:
     @property
     def energised_s(self) -> float:
         """Motor time under voltage so far."""
-        return self._progress.facts.energised_s
+        return self._progress.facts.energised_s + self._progress.session_s
 
     def perform(self, course: Course) -> RunEnded:
         """Run the course to its end. Faults, guards and the operator end it as a value; the drive is disarmed."""
@@ -253,9 +253,7 @@ class Runner:
         if not progress.facts.energised:  # kept in the drive, and downloaded now
             stop_if(self._stream.sensors.judge(block))
             return block
-        seconds = (block.count + block.lost_before) * block.sample_period_s
-        progress.session_s += seconds
-        progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + seconds)
+        progress.session_s += (block.count + block.lost_before) * block.sample_period_s
         stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
         stop_if(self._stream.sensors.judge(block))
         if progress.session_s >= progress.next_status_s:
@@ -278,9 +276,7 @@ class Runner:
             inverter.beat()
             inverter.sleep(max(0.0, min(every_s - (inverter.now_s() - asked_s), left_s)))
         inverter.beat()
-        passed_s = inverter.now_s() - began_s
-        progress.session_s += passed_s
-        progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + passed_s)
+        progress.session_s += inverter.now_s() - began_s
         return status
 
     def _tell(self, record: object) -> None:
@@ -310,9 +306,11 @@ class Runner:
         if not self._progress.has_touched:
             return None
         verified = let_go(self._inverter)
-        self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
+        progress = self._progress
+        progress.facts = replace(progress.facts, energised=False, loaded=None, energised_s=self.energised_s)
+        progress.session_s = 0.0
         note(self._folder, "disarmed", {"because": reason, "verified": verified})
-        if verified.is_confirmed or self._progress.segment < 0:
+        if verified.is_confirmed or progress.segment < 0:
             return None
         return taken_as_live(verified.state)
 

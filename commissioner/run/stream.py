@@ -70,7 +70,7 @@ class Stream:
         if age_s > LATE_S + WINDOWS * self._took_s and self._inverter.now_s() - self._asked_s > LATE_S:
             self.ask_status()
             age_s = self._age_s(block)
-        return replace(block, age_s=age_s)
+        return block.aged(age_s)
 
     def supervise(self) -> DriveStatus:
         """As `ask_status`, where nobody reads samples: how many there are tells how fast the drive's time passes."""

@@ -50,6 +50,7 @@ class SafetyFacts:
     writing_allowed: bool = False
     energised: bool = False
     energised_s: float = 0.0
+    """Under voltage, up to the end of the last session."""
     run_ended: bool = False
 
 

@@ -223,7 +223,7 @@ def _open_phase(current: Signal, cosines: Signal, size_a: float, noise_a: float)
 
 
 def _rms(signal: Signal) -> float:
-    return math.sqrt(float(np.mean(np.square(signal))))
+    return math.sqrt(float(signal @ signal) / signal.size)
 
 
 def _culprit(current: Signal, cosines: Signal) -> str:

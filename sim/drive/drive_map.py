@@ -50,18 +50,23 @@ class Item:
 
     def decode(self, words: list[int]) -> Any:
         """Raw value (wire units) of these words; a list where the item has several."""
-        raw = b"".join(w.to_bytes(2, "big") for w in words)
+        raw = struct.pack(f">{len(words)}H", *words)
         if self.kind == "ascii":
             return raw.rstrip(b"\0").decode("ascii", "replace")
-        values = [v for (v,) in struct.iter_unpack(FORMATS[self.kind], raw)]
-        return values if self.length > 1 else values[0]
+        if self.length == 1:
+            return struct.unpack(FORMATS[self.kind], raw)[0]
+        return [v for (v,) in struct.iter_unpack(FORMATS[self.kind], raw)]
 
     def accepts(self, value: Any) -> bool:
         """No NaN or infinity, and inside the map's limits."""
         if self.kind == "ascii":
             return True
-        values = value if isinstance(value, list) else [value]
-        return all(math.isfinite(v) and self.lowest <= v <= self.highest for v in values)
+        if isinstance(value, list):
+            return all(self._is_inside(v) for v in value)
+        return self._is_inside(value)
+
+    def _is_inside(self, value: float) -> bool:
+        return math.isfinite(value) and self.lowest <= value <= self.highest
 
 
 @dataclass(frozen=True)

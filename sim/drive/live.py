@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from sim.physics import layout as at
 from sim.physics.compiled import kernel, lent
 from sim.physics.kernel import advance_period, all_currents, load
@@ -139,6 +141,15 @@ def _finish_sample(c, means, ring, flags, capacity):
     c[at.C_PRODUCED] += 1
 
 
+def _crc_of(byte):
+    for _ in range(8):
+        byte = (byte >> 1) ^ 0xA001 if byte & 1 else byte >> 1
+    return byte
+
+
+_CRC_OF_BYTE = np.array([_crc_of(byte) for byte in range(256)])
+
+
 @kernel
 def crc16(words):
     """CRC-16/MODBUS over 16-bit registers, high byte first (polynomial 0xA001 reflected, start 0xFFFF)."""
@@ -149,17 +160,17 @@ def crc16(words):
 def crc16_from(crc, words):
     """The same, carried on."""
     for word in words:
-        for byte in ((word >> 8) & 0xFF, word & 0xFF):
-            crc ^= byte
-            for _ in range(8):
-                crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
+        crc = (crc >> 8) ^ _CRC_OF_BYTE[(crc ^ (word >> 8)) & 0xFF]
+        crc = (crc >> 8) ^ _CRC_OF_BYTE[(crc ^ word) & 0xFF]
     return crc
 
 
 @kernel
-def copy_samples(ring, flags, first, count, mask, words):
-    """Samples `first` ... of the channels in the mask, as unsigned words, one sample after the other; what any is flagged with."""
-    at_word, seen = 0, 0
+def write_window(ring, flags, first, count, mask, stated, words, header):
+    """Header, check sum and, behind `header` words, samples `first` ... of the channels in the mask as unsigned words, one sample after
+    the other. `stated`: session, flags besides those of the samples, link in counts."""
+    session, seen, link_count = stated
+    at_word = header
     for k in range(first, first + count):
         row = k % ring.shape[0]
         seen |= flags[row]
@@ -167,11 +178,6 @@ def copy_samples(ring, flags, first, count, mask, words):
             if mask >> channel & 1:
                 words[at_word] = ring[row, channel] & 0xFFFF
                 at_word += 1
-    return seen
-
-
-@kernel
-def check_sum(words, header, used):
-    """Of a window: its header without the sum itself, which is its last word, and the words in use."""
-    crc = crc16_from(0xFFFF, words[: header - 1])
-    return crc16_from(crc, words[header : header + used])
+    words[0], words[1], words[2], words[3] = session, first >> 16 & 0xFFFF, first & 0xFFFF, count
+    words[4], words[5], words[6] = mask, seen, link_count
+    words[header - 1] = crc16_from(crc16_from(0xFFFF, words[: header - 1]), words[header:at_word])

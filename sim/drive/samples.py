@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from sim.drive.drive_map import DriveMap
-from sim.drive.live import CHANNELS, HISTORY, check_sum, copy_samples
+from sim.drive.live import CHANNELS, HISTORY, write_window
 from sim.physics import layout as at
 
 VOLTAGE_STEP_V = 0.01
@@ -65,11 +65,8 @@ class SampleRing:
         first, count = self._around_gaps(first, samples)
         self.next_unread = max(self.next_unread, oldest, first + count)
         words, header = np.zeros(self.map.window_words, np.int64), self.map.window_header_words
-        seen = int(copy_samples(self.ring, self.flags, first, count, self.mask, words[header:]))
-        flags = seen | self._flags(first + count, was_overrun=wanted < oldest, is_running=is_running)
-        place = (first >> 16 & 0xFFFF, first & 0xFFFF)
-        words[: header - 1] = session, *place, count, self.mask, flags, link_count & 0xFFFF
-        words[header - 1] = check_sum(words, header, count * len(self.channels))
+        flags = self._flags(first + count, was_overrun=wanted < oldest, is_running=is_running)
+        write_window(self.ring, self.flags, first, count, self.mask, (session, flags, link_count & 0xFFFF), words, header)
         return words.tolist()
 
     def forget(self) -> None:
@@ -86,6 +83,8 @@ class SampleRing:
 
     def _around_gaps(self, first: int, samples: int) -> tuple[int, int]:
         """(first, count) of up to so many samples. Fault knob: samples the drive lost; a window ends before them or starts behind them."""
+        if not self.gaps:
+            return first, max(0, min(samples, self.produced - first))
         first = self.behind_gaps(first)
         count = min(samples, self.produced - first, *(start - first for start, _ in self.gaps if start > first))
         return first, max(0, count)
