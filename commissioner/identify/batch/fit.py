@@ -37,6 +37,8 @@ SLIGHT_DAMPING = 1e-4
 NEAR, SLOW = 0.03, 0.3
 """A step of no more than this share of the values keeps the sensitivities of where it began; they are computed anew where steps with
 them shrink by less than the second."""
+SAME = 1e-3
+"""Of the values: from no farther away sensitivities are as good as new, and so are standard errors."""
 ROUNDING, NEAR_RISE = 1e-13, 1e-6
 """By what share the sum of squares may rise in a step; the second while steps with kept sensitivities shrink, for these are not
 quite downhill."""
@@ -75,12 +77,13 @@ def fit_segments(
             "the model cannot be simulated from this start", step="identify", value=start, limit="finite currents",
             remedy="check that the nameplate belongs to the motor",
         )  # fmt: skip
-    damping, converged, last_size = FIRST_DAMPING, False, 0.0
+    damping, converged, last_size, moved = FIRST_DAMPING, False, 0.0, 0.0
     spare: Evaluation | None = None
     for _ in range(max_iterations):
         step = _step(problem, present, theta, damping)
         new_theta, new_own = _apply(problem, theta, own, step)
-        near = present if _largest_share(problem, step, theta) < NEAR else None
+        share = _largest_share(problem, step, theta)
+        near = present if share < NEAR else None
         trial = problem.evaluate(new_theta, new_own, over=spare, near=near)
         size = _size_in_std(problem, step, present, theta)
         may_rise = NEAR_RISE if trial.is_near and size < last_size else ROUNDING
@@ -91,14 +94,15 @@ def fit_segments(
             last_size = size
             flat = abs(present.squares - trial.squares) <= 1e-12 * present.squares
             theta, own, present, spare = new_theta, new_own, trial, present
+            moved = moved + share if trial.is_near else 0.0
             damping = max(damping * 0.1, 1e-12)
             if small or (flat and damping <= 1e-8) or trial.squares <= low_enough:
                 converged = True
                 break
             if present.is_near and is_slow:
-                present, spare = problem.evaluate(theta, own, over=spare), present
+                present, spare, moved = problem.evaluate(theta, own, over=spare), present, 0.0
         elif present.is_near:
-            present, spare = problem.evaluate(theta, own, over=trial), present
+            present, spare, moved = problem.evaluate(theta, own, over=trial), present, 0.0
         else:
             spare = trial
             if damping > 1e8:
@@ -107,7 +111,7 @@ def fit_segments(
             if size < tolerance:
                 converged = True
                 break
-    if present.is_near and not is_coarse:
+    if present.is_near and moved > SAME and not is_coarse:
         present = problem.evaluate(theta, own, over=spare)
     return _result(problem, theta, own, present, converged)
 

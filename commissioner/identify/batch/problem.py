@@ -65,8 +65,8 @@ class Problem:
         assert shared + OWN <= output_error.WIDTH, "of more numbers the compiled pass has no room"
         self.free = np.concatenate([model.free_shared, *[self._own_free(s) for s in segments]])
         self.current_span_a = CURRENT_MARGIN * max(peak(s.current_a) for s in segments)
-        self.bases = [self._basis(s.axis_deg) for s in segments]
-        self.integrals = [_from_zero(b) for b in self.bases]
+        tables = {axis_deg: self._tables(axis_deg) for axis_deg in {s.axis_deg for s in segments}}
+        self.tables = [tables[s.axis_deg] for s in segments]
         near = NEAR_ZERO_WHEN_LATE if model.with_delay and not is_coarse else NEAR_ZERO
         self.passes_zero = [self._passes_zero(s.current_a, near) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
@@ -87,11 +87,13 @@ class Problem:
     def _own_free(segment: Segment) -> NDArray[np.bool_]:
         return np.array([True, not segment.starts_at_rest, not segment.starts_at_rest])
 
-    def _basis(self, axis_deg: float) -> Matrix:
-        """(rows, coefficients): the axis voltage that a unit of each leg coefficient makes, over the axis current."""
+    def _tables(self, axis_deg: float) -> tuple[Matrix, Matrix]:
+        """(rows, coefficients): the axis voltage that a unit of each leg coefficient makes, over the axis current; its integral."""
         if self.model.leg is None:
-            return np.zeros((TABLE_ROWS, 0))
-        return np.ascontiguousarray(self.model.leg.on_axis(np.linspace(0.0, self.current_span_a, TABLE_ROWS), axis_deg))
+            return np.zeros((TABLE_ROWS, 0)), np.zeros((TABLE_ROWS, 0))
+        current_a = np.linspace(0.0, self.current_span_a, TABLE_ROWS)
+        basis = np.ascontiguousarray(self.model.leg.on_axis(current_a, axis_deg))
+        return basis, _from_zero(basis)
 
     def _passes_zero(self, current_a: Signal, near: float) -> NDArray[np.bool_]:
         """Periods in which the leg loss may turn round or bend, by the measured current: near zero beside what it moves in
@@ -223,7 +225,7 @@ class Problem:
         information, score, block, scores, residual, _ = shared
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
         machine = Machine(theta, np.array(model.exponents, dtype=np.int64), model.flux_scale_wb)
-        shapes = Shapes(self.bases[k], self.integrals[k], self.current_span_a)
+        shapes = Shapes(*self.tables[k], self.current_span_a)
         squares = output_error.simulate(
             Measured(segment.voltage_v, before, segment.current_a, self.weights[k], self.passes_zero[k]),
             held,
