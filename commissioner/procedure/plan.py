@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.checks import DriveLimits
@@ -118,7 +119,7 @@ class Job:
         """No test needs more along the axis: 30 % of the rated phase voltage's peak."""
         return 0.3 * math.sqrt(2 / 3) * self.nameplate.rated_voltage_v
 
-    @property
+    @cached_property
     def stretch(self) -> float:
         """All test times hold for rotor time constants up to 0.5 s and are stretched in proportion beyond."""
         return max(1.0, prior(self.nameplate).typical.rotor_time_constant_s / 0.5)

@@ -183,7 +183,7 @@ def _accept(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> Wind
 
 def _block(packed: bytes, header: dict[str, int], stream: StreamFormat, lost: int, is_clipped: bool) -> SampleBlock:
     shape = (header["count"], stream.channels)
-    data = np.frombuffer(packed, ">i2", shape[0] * shape[1], 2 * stream.layout.header_words).reshape(shape)
+    data = np.ndarray(shape, ">i2", packed, 2 * stream.layout.header_words)
     scaled = np.multiply(data.T, stream.scales, order="C")
     columns: dict[int, NDArray[np.float64]] = dict(zip(stream.bits, scaled, strict=True))
     return SampleBlock(

@@ -108,7 +108,7 @@ class Registers:
                 int(self.drive.values["window_index"]),
                 fitting,
                 self.drive.session,
-                round(self.drive.x[at.X_LINK] / self.drive.link_step_v),
+                round(float(self.drive.x[at.X_LINK]) / self.drive.link_step_v),
                 is_running=self.drive.is_energised,
             )
         return self.window[skip : skip + count]

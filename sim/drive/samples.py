@@ -66,7 +66,9 @@ class SampleRing:
         self.next_unread = max(self.next_unread, oldest, first + count)
         words, header = np.zeros(self.map.window_words, np.int64), self.map.window_header_words
         flags = self._flags(first + count, was_overrun=wanted < oldest, is_running=is_running)
-        write_window(self.ring, self.flags, first, count, self.mask, (session, flags, link_count & 0xFFFF), words, header)
+        write_window(
+            self.ring, self.flags, first, count, self.mask, (session, flags, link_count & 0xFFFF), words, header
+        )
         return words.tolist()
 
     def forget(self) -> None:

@@ -33,7 +33,7 @@ from commissioner.motor.space_vector import is_aslant
 
 Estimator = Literal["pao", "lyapunov", "nls"]
 Matrix = NDArray[np.float64]
-STILL = 1e-3
+STILL = 1e-2
 """What a fit that begins at another axis' may still have to go, in standard errors."""
 POORER = 1.1
 """Of the earlier axis' residual: what a fit that begins like it may leave before the axis is also fitted as if it were the first. The

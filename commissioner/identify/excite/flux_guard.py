@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections import deque
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -100,7 +101,7 @@ class FluxGuard:
     _backed_off_s: float = field(default=-math.inf, init=False)
     _backed_off_at: float = field(default=0.0, init=False)
     _share: float = field(default=UNKNOWN_SHARE, init=False)
-    _recent: list[_Seen] = field(default_factory=list, init=False)
+    _recent: deque[_Seen] = field(default_factory=deque, init=False)
 
     def __post_init__(self) -> None:
         if self.excitation.dc_bias_v:
@@ -148,7 +149,8 @@ class FluxGuard:
         largest_a = peak(current_a)
         current_fraction = max(largest_a, predicted_a) / (0.5 * (self.current_a + self.trip_a))
         difference = peak(estimate.stator_flux_wb - model_free)
-        self._recent = [r for r in self._recent if time_s - r.time_s < self._window_s]
+        while self._recent and time_s - self._recent[0].time_s >= self._window_s:
+            self._recent.popleft()
         self._recent.append(_Seen(time_s, difference, max(observer_wb, model_free_wb), largest_a))
         if abs(present_scale - self._last_scale) > 1e-4 or age_s > self.latency_s:
             self._scale_since_s = time_s

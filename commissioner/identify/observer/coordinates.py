@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.compiled import njit
 from commissioner.errors import UsageError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox
@@ -62,20 +63,18 @@ def to_theta(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix
     return np.asarray(_thetas(np.array([machine.as_tuple()]), filter_z, period_s)[0])
 
 
+@njit()
 def _thetas(machines: Matrix, filter_z: Matrix, period_s: float) -> Matrix:
     """(n, 4) of `machines` (n, 4), rows of (R_s, R_R, L_sigma, L_M)."""
-    a1, a0, b1, b0 = pulse_transfers(machines, period_s).T
-    f1, f2 = filter_z
+    f1, f2 = filter_z[0], filter_z[1]
     spread = f1 - f2
     at_1, at_2 = (1.0 - f1) * spread, (1.0 - f2) * spread
-    return np.column_stack(
-        [
-            -(f1 * f1 + a1 * f1 + a0) / at_1,
-            (f2 * f2 + a1 * f2 + a0) / at_2,
-            (b1 * f1 + b0) / at_1,
-            -(b1 * f2 + b0) / at_2,
-        ]
-    )
+    out = pulse_transfers(machines, period_s)
+    for k in range(machines.shape[0]):
+        a1, a0, b1, b0 = out[k, 0], out[k, 1], out[k, 2], out[k, 3]
+        out[k, 0], out[k, 1] = -(f1 * f1 + a1 * f1 + a0) / at_1, (f2 * f2 + a1 * f2 + a0) / at_2
+        out[k, 2], out[k, 3] = (b1 * f1 + b0) / at_1, -(b1 * f2 + b0) / at_2
+    return out
 
 
 def ud_factors(covariance: Matrix) -> tuple[Matrix, Matrix]:
@@ -88,10 +87,21 @@ def ud_factors(covariance: Matrix) -> tuple[Matrix, Matrix]:
 
 def theta_jacobian(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
     """d theta / d(R_s, R_R, L_sigma, L_M), (4, 4), by central differences."""
-    values = np.array(machine.as_tuple())
-    steps = np.diag(1e-4 * values)
-    there = _thetas(np.vstack([values + steps, values - steps]), filter_z, period_s)
-    return np.asarray((there[:4] - there[4:]).T / (2e-4 * values))
+    jacobian: Matrix = _jacobian(np.array(machine.as_tuple()), filter_z, period_s)
+    return jacobian
+
+
+@njit()
+def _jacobian(values: Matrix, filter_z: Matrix, period_s: float) -> Matrix:
+    beside = np.empty((8, 4))
+    for k in range(8):
+        beside[k] = values
+        beside[k, k % 4] += (1e-4 if k < 4 else -1e-4) * values[k % 4]
+    there = _thetas(beside, filter_z, period_s)
+    out = np.empty((4, 4))
+    for k in range(4):
+        out[:, k] = (there[k] - there[4 + k]) / (2e-4 * values[k])
+    return out
 
 
 def prior_covariance(prior: ParameterBox, filter_z: Matrix, period_s: float) -> Matrix:
