@@ -69,7 +69,7 @@ def _thetas(machines: Matrix, filter_z: Matrix, period_s: float) -> Matrix:
     f1, f2 = filter_z[0], filter_z[1]
     spread = f1 - f2
     at_1, at_2 = (1.0 - f1) * spread, (1.0 - f2) * spread
-    out = pulse_transfers(machines, period_s)
+    out: Matrix = pulse_transfers(machines, period_s)
     for k in range(machines.shape[0]):
         a1, a0, b1, b0 = out[k, 0], out[k, 1], out[k, 2], out[k, 3]
         out[k, 0], out[k, 1] = -(f1 * f1 + a1 * f1 + a0) / at_1, (f2 * f2 + a1 * f2 + a0) / at_2
