@@ -39,6 +39,8 @@ WORST_CHANCE = 1e-4
 RESOLUTION = 5e-4
 """What a curve point may be off sideways although the fit is sure of it, of the largest current: a steep loss moves much
 within one sample. In height: `FORM`."""
+OTHER_KNEES, SAME_KNEE = (0.25, 1.0, 4.0), 0.1
+"""Of a typical knee, from which other minima are looked for; knees whose logarithms differ by no more are of one."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +64,48 @@ def one_inverter(fits: Sequence[BatchFit], pairs: Sequence[Pair]) -> list[BatchF
     return [_given(f, values, covariance) for f in fits]
 
 
+@dataclass(frozen=True)
+class _Curve:
+    """What all fits say of a leg's loss at the knots, A and V, `(n,)`; `root` (n, n) whitens what is missed of it."""
+
+    current: Signal
+    largest_a: float
+    mean: Signal
+    root: Matrix
+
+
 def pairs_of(fits: Sequence[BatchFit]) -> list[Pair]:
     """Every pair of laws drawn to the curves of the fits together, the best first; none where a leg was not fitted."""
+    curve = _curve_of(fits)
+    if curve is None:
+        return []
+    pairs = [_fit_pair((dead, drop), curve) for dead, drop in itertools.product(DEAD_TIME, THRESHOLD)]
+    return sorted(pairs, key=lambda p: p.misfit)
+
+
+def minima_of(fits: Sequence[BatchFit], pair: Pair) -> list[Pair]:
+    """The pair drawn to the same curves from other knees, too: one for every minimum. Of a narrow and a wide knee curves leave open which is
+    whose, samples do not."""
+    curve = _curve_of(fits)
+    assert curve is not None
+    minima = [pair]
+    for begun in itertools.product(OTHER_KNEES, OTHER_KNEES):
+        other = _fit_pair((pair.law.dead_time, pair.law.threshold), curve, begun)
+        if all(_is_apart(other, known) for known in minima):
+            minima.append(other)
+    return minima
+
+
+def _is_apart(a: Pair, b: Pair) -> bool:
+    """Whether these are two minima of one pair of laws."""
+    knees = (a.law.dead_time_knee_a / b.law.dead_time_knee_a, a.law.threshold_knee_a / b.law.threshold_knee_a)
+    return max(abs(math.log(k)) for k in knees) > SAME_KNEE
+
+
+def _curve_of(fits: Sequence[BatchFit]) -> _Curve | None:
     law = fits[0].model.leg
     if not isinstance(law, LegLaw) or any(f.model.leg != law for f in fits):
-        return []
+        return None
     parts = [f.model.leg_slice for f in fits]
     weights = [np.linalg.pinv(f.covariance[p, p]) for f, p in zip(fits, parts, strict=True)]
     information = np.sum(weights, axis=0)
@@ -77,17 +116,14 @@ def pairs_of(fits: Sequence[BatchFit]) -> list[Pair]:
     steepness = np.gradient(np.append(0.0, mean), np.append(0.0, current))[1:]
     blur = np.square(steepness * RESOLUTION * law.largest_a) + (FORM * np.max(np.abs(mean))) ** 2
     root = np.linalg.cholesky(np.linalg.inv(np.linalg.inv(information) + np.diag(blur))).T
-    pairs = [
-        _fit_pair((dead, drop), current, law.largest_a, mean, root)
-        for dead, drop in itertools.product(DEAD_TIME, THRESHOLD)
-    ]
-    return sorted(pairs, key=lambda p: p.misfit)
+    return _Curve(current, law.largest_a, mean, root)
 
 
-def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: Signal, root: Matrix) -> Pair:
-    """Plateau, threshold's share and both knees (logarithms) by weighted least squares."""
+def _fit_pair(names: tuple[str, str], drawn: _Curve, begun: tuple[float, float] = (1.0, 1.0)) -> Pair:
+    """Plateau, threshold's share and both knees (logarithms) by weighted least squares; knees are `begun` at so many typical ones."""
     from scipy.optimize import least_squares
 
+    current, largest_a, mean, root = drawn.current, drawn.largest_a, drawn.mean, drawn.root
     dead, drop = DEAD_TIME[names[0]], THRESHOLD[names[1]]
     plateau = max(peak(mean), 1e-6)
     typical = math.log(TYPICAL_KNEE * largest_a)
@@ -113,7 +149,7 @@ def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: S
         rows = total * np.column_stack([of_dead[:, 0] + of_drop[:, 0], by_ratio, of_dead[:, 1], of_drop[:, 1]])
         return np.vstack([root @ rows, np.diag([0.0, 1.0 / SHARE_SPREAD, 1.0 / KNEE_SPREAD, 1.0 / KNEE_SPREAD])[1:]])
 
-    start = [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical]
+    start = [math.log(plateau), math.log(TYPICAL_SHARE), *(typical + math.log(knee) for knee in begun)]
     fit = least_squares(misfit, start, jacobian, method="lm", max_nfev=300)
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)
     moves = np.linalg.solve(root, fit.jac[: mean.size])

@@ -20,7 +20,7 @@ from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.model import Matrix
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.identify.batch.slow_noise import widened
-from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair
+from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair, minima_of
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.leg_pair import PairLaw
 from commissioner.identify.inverter.mixture import chances_of, mixture
@@ -60,10 +60,11 @@ def with_known_law(
         return list(drawn)
     if any(_knee_share(f) > MOST_KNEE for f in fits):
         return list(drawn)
-    likely = [p for p in pairs if p.misfit < pairs[0].misfit + LIKELY][:MOST_TRIED]
-    if not likely:
+    if not pairs:
         return list(drawn)
-    begun = _on_first_test(fits[0], tests[0], likely)
+    likely = [p for p in pairs if p.misfit < pairs[0].misfit + LIKELY][:MOST_TRIED]
+    minima = sorted((m for p in likely for m in minima_of(fits, p)), key=lambda m: m.misfit)
+    begun = _on_first_test(fits[0], tests[0], [m for m in minima if m.misfit < minima[0].misfit + LIKELY])
     refits = [r for f in begun[:MOST_KEPT] if (r := _fit_all(fits, tests, f)) is not None]
     free = sum(f.sum_of_squares / f.noise_a**2 for f in fits)
     spare = sum(f.model.leg_size for f in fits) - 4
@@ -82,14 +83,16 @@ def _knee_share(fit: BatchFit) -> float:
 
 
 def _on_first_test(fit: BatchFit, segments: Sequence[Segment], likely: Sequence[Pair]) -> list[BatchFit]:
-    """The first test with each pair that describes it about as well as any, the best first."""
-    found: list[BatchFit] = []
+    """The first test with each pair that describes it about as well as any, at its lowest minimum, the best first."""
+    found: dict[tuple[str, str], BatchFit] = {}
     for pair in likely:
-        best = min((f.sum_of_squares for f in found), default=math.inf)
-        if (one := _fit_one(fit, segments, pair.law, pair.plateaus, best + HOPELESS * fit.noise_a**2)) is not None:
-            found.append(one)
-    found.sort(key=lambda f: f.sum_of_squares)
-    return [f for f in found if f.sum_of_squares < found[0].sum_of_squares + NO_WEIGHT * fit.noise_a**2]
+        best = min((f.sum_of_squares for f in found.values()), default=math.inf)
+        one = _fit_one(fit, segments, pair.law, pair.plateaus, best + HOPELESS * fit.noise_a**2)
+        names = pair.law.dead_time, pair.law.threshold
+        if one is not None and (names not in found or one.sum_of_squares < found[names].sum_of_squares):
+            found[names] = one
+    begun = sorted(found.values(), key=lambda f: f.sum_of_squares)
+    return [f for f in begun if f.sum_of_squares < begun[0].sum_of_squares + NO_WEIGHT * fit.noise_a**2]
 
 
 def _fit_one(fit: BatchFit, segments: Sequence[Segment], law: PairLaw, values: Signal, most: float) -> BatchFit | None:
