@@ -31,7 +31,7 @@ WORTH = 0.003
 MOST_KNEE = 0.17
 """Of the largest current, where the free curve has 63 % of its loss, from where on no law is told from another by the samples: a motor of a tenth of its drive,
 0.25, was given R_s 16 % off as of 0.9 %; at 0.13 (a fifth) it is right to 0.2 %."""
-LIKELY, MOST_TRIED, MOST_KEPT = 25.0, 6, 4
+LIKELY, MOST_TRIED, MOST_KEPT = 25.0, 9, 4
 """Pairs tried on the samples: those whose curves are this near the best in chi-square, and how many; then, how many of
 them on every test."""
 ROUNDS, STEPS, TOLERANCE = 3, 8, 0.03
@@ -62,9 +62,9 @@ def with_known_law(
         return list(drawn)
     if not pairs:
         return list(drawn)
-    likely = [p for p in pairs if p.misfit < pairs[0].misfit + LIKELY][:MOST_TRIED]
-    minima = sorted((m for p in likely for m in minima_of(fits, p)), key=lambda m: m.misfit)
-    begun = _on_first_test(fits[0], tests[0], [m for m in minima if m.misfit < minima[0].misfit + LIKELY])
+    minima = sorted((m for p in pairs for m in minima_of(fits, p)), key=lambda m: m.misfit)
+    likely = [m for m in minima if m.misfit < minima[0].misfit + LIKELY][:MOST_TRIED]
+    begun = _on_first_test(fits[0], tests[0], likely)
     refits = [r for f in begun[:MOST_KEPT] if (r := _fit_all(fits, tests, f)) is not None]
     free = sum(f.sum_of_squares / f.noise_a**2 for f in fits)
     spare = sum(f.model.leg_size for f in fits) - 4
