@@ -39,8 +39,11 @@ WORST_CHANCE = 1e-4
 RESOLUTION = 5e-4
 """What a curve point may be off sideways although the fit is sure of it, of the largest current: a steep loss moves much
 within one sample. In height: `FORM`."""
-OTHER_KNEES, SAME_KNEE = (0.25, 1.0, 4.0), 0.1
-"""Of a typical knee, from which other minima are looked for; knees whose logarithms differ by no more are of one."""
+_STARTS = (0.25, 1.0, 4.0)
+OTHER_KNEES = [knees for knees in itertools.product(_STARTS, _STARTS) if knees != (1.0, 1.0)]
+"""Of the dead time's and the threshold's typical ones, from which other minima are looked for."""
+SAME_KNEE = 0.1
+"""Knees whose logarithms differ by no more are of one minimum."""
 
 
 @dataclass(frozen=True)
@@ -83,17 +86,21 @@ def pairs_of(fits: Sequence[BatchFit]) -> list[Pair]:
     return sorted(pairs, key=lambda p: p.misfit)
 
 
-def minima_of(fits: Sequence[BatchFit], pair: Pair) -> list[Pair]:
-    """The pair drawn to the same curves from other knees, too: one for every minimum. Of a narrow and a wide knee curves leave open which is
-    whose, samples do not."""
+def minima_of(fits: Sequence[BatchFit], pairs: Sequence[Pair]) -> list[Pair]:
+    """The `pairs` of these fits drawn to the curves from other knees, too: one for every minimum, the best first. Of a narrow and a wide
+    knee curves leave open which is whose, samples do not."""
     curve = _curve_of(fits)
-    assert curve is not None
-    minima = [pair]
-    for begun in itertools.product(OTHER_KNEES, OTHER_KNEES):
-        other = _fit_pair((pair.law.dead_time, pair.law.threshold), curve, begun)
-        if all(_is_apart(other, known) for known in minima):
-            minima.append(other)
-    return minima
+    if curve is None:
+        return []
+    minima: list[Pair] = []
+    for pair in pairs:
+        known = [pair]
+        for begun in OTHER_KNEES:
+            other = _fit_pair((pair.law.dead_time, pair.law.threshold), curve, begun)
+            if all(_is_apart(other, one) for one in known):
+                known.append(other)
+        minima += known
+    return sorted(minima, key=lambda m: m.misfit)
 
 
 def _is_apart(a: Pair, b: Pair) -> bool:

@@ -62,7 +62,7 @@ def with_known_law(
         return list(drawn)
     if not pairs:
         return list(drawn)
-    minima = sorted((m for p in pairs for m in minima_of(fits, p)), key=lambda m: m.misfit)
+    minima = minima_of(fits, pairs)
     likely = [m for m in minima if m.misfit < minima[0].misfit + LIKELY][:MOST_TRIED]
     begun = _on_first_test(fits[0], tests[0], likely)
     refits = [r for f in begun[:MOST_KEPT] if (r := _fit_all(fits, tests, f)) is not None]

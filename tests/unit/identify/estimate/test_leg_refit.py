@@ -62,7 +62,7 @@ def test_no_law_is_believed_whose_knee_spans_the_test(monkeypatch, knee_share, i
     unsure = SimpleNamespace(
         model=model, theta=np.append(8.0, values), covariance=np.eye(1), sum_of_squares=1.0, noise_a=1.0
     )
-    monkeypatch.setattr(leg_refit, "minima_of", lambda _fits, pair: [pair])
+    monkeypatch.setattr(leg_refit, "minima_of", lambda _fits, pairs: list(pairs))
     monkeypatch.setattr(leg_refit, "_on_first_test", lambda *_: tried.append(True) or [])
     drawn = leg_refit.with_known_law([unsure], [[]], [unsure], [SimpleNamespace(misfit=1.0)])
     assert drawn == [unsure] and bool(tried) is is_tried
@@ -75,7 +75,7 @@ def test_every_minimum_of_a_narrow_and_a_wide_knee_is_found():
     model = SimpleNamespace(leg=curve, leg_slice=slice(0, None))
     fit = SimpleNamespace(model=model, theta=leg, covariance=0.1**2 * np.eye(curve.size))
     pair = next(p for p in pairs_of([fit]) if (p.law.dead_time, p.law.threshold) == ("capacitive", "tanh"))
-    minima = minima_of([fit], pair)
+    minima = minima_of([fit], [pair])
     assert minima[0] is pair
     assert sorted(m.law.threshold_knee_a for m in minima) == pytest.approx([0.27, 0.73], rel=0.05)
     assert max(m.misfit for m in minima) < 2.0
